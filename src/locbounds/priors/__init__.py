@@ -1,0 +1,5 @@
+"""What is known of the state before the first measurement."""
+
+from locbounds.priors.gaussian import GaussianPrior
+
+__all__ = ["GaussianPrior"]

@@ -1,0 +1,162 @@
+"""A scenario: what is located, from what, with which prior knowledge."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from locbounds.axes import Array, Bool, Float
+from locbounds.errors import InputError
+from locbounds.measurement import Range
+from locbounds.motion import Motion
+from locbounds.noise import Noise
+from locbounds.priors import GaussianPrior
+from locbounds.sight import KnownSight, Sight
+from locbounds.times import Times
+
+
+class Link(eqx.Module):
+    """The radio link between the mobile and one anchor.
+
+    Parameters
+    ----------
+    name
+        Name of the anchor.
+    measurement
+        What is measured: ``h(position)``.
+    sight
+        The chain of sight conditions.
+    noises
+        One noise per sight condition, (LOS, NLOS).
+    reports
+        Which of the steps 1..K have a measurement, [steps]; None means all.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> Link("bs1", lb.Range([0, 0]), lb.MarkovSight.stay(0.9), (lb.Gaussian(0, 150), lb.Gaussian(513, 436))).name
+    'bs1'
+    """
+
+    name: str = eqx.field(static=True)
+    measurement: Range
+    sight: Sight
+    noises: tuple[Noise, ...]
+    reports: Bool[Array, " steps"] | None = None
+
+
+class Scenario(eqx.Module):
+    """Everything a bound or a filter needs to know; immutable, a JAX pytree with NumPy float64 leaves.
+
+    Parameters
+    ----------
+    title
+        One line that names it.
+    times
+        Times of steps 0..K.
+    motion
+        Motion model of the mobile.
+    prior
+        Law of the state at step 0.
+    links
+        The links to the anchors. Their chains, noises and starts are independent of each other.
+
+    Raises
+    ------
+    InputError
+        If pieces do not fit: dimensions, numbers of modes, names, steps.
+    """
+
+    title: str = eqx.field(static=True)
+    times: Times
+    motion: Motion
+    prior: GaussianPrior
+    links: tuple[Link, ...] = eqx.field(converter=tuple)
+
+    def __check_init__(self):
+        if not self.links:
+            raise InputError("the scenario has no anchors", "Give at least one")
+        names = [link.name for link in self.links]
+        if len(set(names)) < len(names):
+            raise InputError(f"anchor names repeat: {names}", "Give every anchor its own name")
+        if len(self.prior.mean) != self.motion.state_size:
+            raise InputError(
+                f"the prior has {len(self.prior.mean)} components, the motion model {self.motion.state_size}",
+                f"Give one prior number per state component: {', '.join(self.motion.state_names)}",
+            )
+        for link in self.links:
+            if len(link.measurement.anchor) != self.dim:
+                raise InputError(
+                    f"anchor {link.name} has {len(link.measurement.anchor)} coordinates, the motion model {self.dim}",
+                    "Use the same number of dimensions everywhere",
+                )
+            if len(link.noises) != len(link.sight.start):
+                raise InputError(
+                    f"anchor {link.name} has {len(link.noises)} noises for {len(link.sight.start)} sight conditions",
+                    "Give one noise per sight condition",
+                )
+            if link.reports is not None and np.shape(link.reports) != (self.steps,):
+                raise InputError(
+                    f"anchor {link.name} says for {np.shape(link.reports)[0]} steps whether it reported, "
+                    f"the scenario has {self.steps}",
+                    "Give one truth value per step 1..K",
+                )
+
+    @property
+    def steps(self) -> int:
+        """Number of measurement steps K; results have K + 1 rows, step 0 being the prior."""
+        return self.times.steps
+
+    @property
+    def dim(self) -> int:
+        """Number of position coordinates."""
+        return self.motion.dim
+
+    @property
+    def anchors(self) -> Float[Array, "links space"]:
+        """Anchor positions in metres."""
+        stack = np.stack if not any(isinstance(a.measurement.anchor, jax.Array) for a in self.links) else jnp.stack
+        return stack([link.measurement.anchor for link in self.links])
+
+    @property
+    def reports(self) -> Bool[Array, "steps links"]:
+        """Which link reported at which of the steps 1..K."""
+        everywhere = np.ones(self.steps, dtype=bool)
+        return np.stack([everywhere if link.reports is None else link.reports for link in self.links], axis=1)
+
+    @property
+    def transition(self) -> Float[Array, "steps state state"]:
+        """F of every step."""
+        return jax.vmap(self.motion.transition)(jnp.asarray(self.times.intervals))
+
+    @property
+    def process_noise(self) -> Float[Array, "steps state state"]:
+        """Q of every step."""
+        return jax.vmap(self.motion.covariance)(jnp.asarray(self.times.intervals))
+
+    def replace(self, **changes) -> "Scenario":
+        """A copy with some fields changed; all checks run again."""
+        fields = {name: getattr(self, name) for name in ("title", "times", "motion", "prior", "links")}
+        return Scenario(**(fields | changes))
+
+    def with_times(self, time_s: Float[Array, " steps+1"]) -> "Scenario":
+        """The same scenario at other times; which steps had reports is forgotten."""
+        links = [Link(a.name, a.measurement, a.sight, a.noises) for a in self.links]
+        return self.replace(times=Times(time_s), links=links)
+
+    def with_reports(self, reports: Bool[Array, "steps links"]) -> "Scenario":
+        """The same scenario with a mask of the measurements that exist."""
+        reports = np.asarray(reports, dtype=bool)
+        links = [Link(a.name, a.measurement, a.sight, a.noises, reports[:, m]) for m, a in enumerate(self.links)]
+        return self.replace(links=links)
+
+    def with_known_sight(self, modes: Sequence) -> "Scenario":
+        """The same scenario with a known sight schedule, [steps, links] or [steps] for all links alike."""
+        modes = np.asarray(modes)
+        modes = np.broadcast_to(modes[:, None] if modes.ndim == 1 else modes, (len(modes), len(self.links)))
+        links = [
+            Link(a.name, a.measurement, KnownSight(modes[:, m]), a.noises, a.reports) for m, a in enumerate(self.links)
+        ]
+        return self.replace(links=links)

@@ -1,0 +1,137 @@
+"""Drawing tracks, sight conditions and measurements from a scenario."""
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from locbounds.axes import Array, Float, Int
+from locbounds.blocks import Stream, block_key, check_seed
+from locbounds.errors import InputError
+from locbounds.linalg import psd_root
+from locbounds.noise import Noise
+from locbounds.precision import double_precision
+from locbounds.scenario import Scenario
+
+RUNS_PER_BLOCK = 256
+
+
+class Draws(NamedTuple):
+    """Simulated tracks.
+
+    Attributes
+    ----------
+    states
+        [runs, steps+1, state]; row 0 is the state at step 0.
+    sight
+        [runs, steps, links], 0 = LOS, 1 = NLOS.
+    measurements
+        [runs, steps, links] in metres, NaN where a link did not report.
+    """
+
+    states: Float[Array, "runs steps+1 state"]
+    sight: Int[Array, "runs steps links"]
+    measurements: Float[Array, "runs steps links"]
+
+
+def draw_states(key: Array, scenario: Scenario, runs: int) -> Float[Array, "runs steps+1 state"]:
+    """Tracks from the prior and the motion model."""
+    first, driving = jax.random.split(key)
+    n = scenario.motion.state_size
+    x0 = scenario.prior.mean + jax.random.normal(first, (runs, n)) @ psd_root(jnp.asarray(scenario.prior.covariance)).T
+    roots = psd_root(scenario.process_noise)
+    v = jnp.einsum("krj,kij->kri", jax.random.normal(driving, (scenario.steps, runs, n)), roots)
+
+    def step(x, piece):
+        F, v = piece
+        x = x @ F.T + v
+        return x, x
+
+    _, later = jax.lax.scan(step, x0, (scenario.transition, v))
+    return jnp.concatenate([x0[:, None], jnp.moveaxis(later, 0, 1)], axis=1)
+
+
+def draw_sight(
+    key: Array, start: Float[Array, " modes"], transitions: Float[Array, "steps modes modes"], runs: int
+) -> Int[Array, "steps runs"]:
+    """Sight of one link at steps 1..K; the chain starts at step 0."""
+    first, rest = jax.random.split(key)
+
+    def pick(law, u):  # inverse distribution function; law [..., modes]
+        return jnp.sum(u[..., None] >= jnp.cumsum(law, -1)[..., :-1], -1)
+
+    r0 = pick(jnp.asarray(start), jax.random.uniform(first, (runs,)))
+
+    def step(r, piece):
+        T, u = piece
+        r = pick(T[r], u)
+        return r, r
+
+    return jax.lax.scan(step, r0, (transitions, jax.random.uniform(rest, (len(transitions), runs))))[1]
+
+
+def draw_noise(key: Array, noises: tuple[Noise, ...], sight: Int[Array, "*n"]) -> Float[Array, "*n"]:
+    """Noise given the sight of every sample."""
+    keys = jax.random.split(key, len(noises))
+    draws = [noise.sample(k, sight.shape) for noise, k in zip(noises, keys, strict=True)]
+    w = draws[0]
+    for mode, draw in enumerate(draws[1:], start=1):
+        w = jnp.where(sight == mode, draw, w)
+    return w
+
+
+@partial(jax.jit, static_argnames="runs")
+def _draw_block(scenario: Scenario, seed: Array, block: Array, runs: int) -> Draws:
+    states = draw_states(block_key(seed, Stream.TRACKS, block), scenario, runs)
+    position = scenario.motion.position(states[:, 1:])
+    intervals = jnp.asarray(scenario.times.intervals)
+    sights, measurements = [], []
+    for m, link in enumerate(scenario.links):
+        key = jax.random.fold_in(block_key(seed, Stream.MEASUREMENTS, block), m)
+        chain, noise = jax.random.split(key)
+        r = draw_sight(chain, link.sight.start, link.sight.transitions(intervals), runs).T
+        z = jax.vmap(jax.vmap(link.measurement))(position) + draw_noise(noise, link.noises, r)
+        reports = True if link.reports is None else jnp.asarray(link.reports)
+        sights.append(r)
+        measurements.append(jnp.where(reports, z, jnp.nan))
+    return Draws(states, jnp.stack(sights, -1), jnp.stack(measurements, -1))
+
+
+@double_precision
+def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
+    """Draw tracks, sight conditions and measurements.
+
+    Parameters
+    ----------
+    scenario
+        What to draw from.
+    runs
+        Number of tracks, at least 1. The first tracks are the same for any number.
+    seed
+        Seed of the random numbers.
+
+    Returns
+    -------
+    Draws
+        States [runs, steps+1, state], sight [runs, steps, links], measurements [runs, steps, links].
+
+    Raises
+    ------
+    InputError
+        If ``runs`` is below 1.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> lb.simulate(lb.papers.fritsche2013.scenario(), runs=2, seed=1).measurements.shape
+    (2, 100, 3)
+    """
+    if runs < 1 or int(runs) != runs:
+        raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 1")
+    check_seed(seed)
+    blocks = [
+        _draw_block(scenario, np.uint32(seed), np.uint32(b), RUNS_PER_BLOCK) for b in range(-(-runs // RUNS_PER_BLOCK))
+    ]
+    return Draws(*(np.concatenate([np.asarray(part) for part in parts])[:runs] for parts in zip(*blocks, strict=True)))
