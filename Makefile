@@ -37,6 +37,7 @@ bench: $(BENCH) ## speed, side by side with today's alternatives
 	$(PY) -m benchmarks
 
 docs: $(DOCS) ## docs/_build/html/index.html; executes the examples, a warning is an error
+	rm -rf docs/generated
 	$(PY) -m sphinx --fail-on-warning --keep-going --quiet --fresh-env docs docs/_build/html
 
 pin: ## write constraints.txt anew from the newest versions that fit (setuptools: the interpreter's own, not ours)
