@@ -77,6 +77,15 @@ def load(path: str | os.PathLike) -> Scenario:
     ------
     InputError
         If the file cannot be read, or as :func:`loads`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import locbounds as lb
+    >>> path = Path(tempfile.mkdtemp()) / "scenario.toml"
+    >>> lb.save(lb.papers.fritsche2013.scenario(), path)
+    >>> lb.load(path).steps
+    100
     """
     path = Path(path)
     try:
@@ -137,6 +146,12 @@ def dumps(scenario: Scenario, comments: Mapping[str, str] | None = None) -> str:
     ------
     InputError
         If a model piece has no form in a scenario file.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> dumps(lb.papers.fritsche2013.scenario()).splitlines()[-1]
+    'bs3 = { position_m = [6000, 2000] }'
     """
     notes = dict(TEACHING)
     extra: dict[str, list[str]] = {}
@@ -162,6 +177,15 @@ def save(scenario: Scenario, path: str | os.PathLike, comments: Mapping[str, str
     ------
     InputError
         If the file cannot be written; an old file is then untouched.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import locbounds as lb
+    >>> path = Path(tempfile.mkdtemp()) / "scenario.toml"
+    >>> lb.save(lb.papers.fritsche2013.scenario(), path, {"links.los": "from the measurements of May"})
+    >>> "# from the measurements of May" in path.read_text()
+    True
     """
     atomic_write_text(path, dumps(scenario, comments))
 
