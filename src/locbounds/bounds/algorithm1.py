@@ -70,7 +70,7 @@ def _scores(scenario, seed, block, *, samples) -> Float[Array, "samples horizons
             l = jnp.exp(log_l - log_l.max())
             f = l * (f @ T)
             D = l[:, None, None] * jnp.einsum("ij,inx->jnx", T, D)
-            D = D.at[:, k].add(f[:, None] * gradient)
+            D = jnp.asarray(D).at[:, k].add(f[:, None] * gradient)
             total = f.sum()
             f, D = f / total, D / total
             return (f, D), D.sum(0)
