@@ -75,17 +75,33 @@ def evaluate(
     if runs < 2 or int(runs) != runs:
         raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 2")
     draws = simulate(scenario, runs=runs, seed=seed)
+    return evaluate_on(filter, scenario, draws, seed=seed, name=name, progress=progress)
+
+
+def evaluate_on(
+    filter: Callable[..., Any],
+    scenario: Scenario,
+    draws: Draws,
+    *,
+    seed: int = 0,
+    name: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Result:
+    """As :func:`evaluate`, on tracks that were drawn before: several filters then see the same ones."""
+    runs, n = len(draws.states), scenario.motion.state_size
     errors, nees = [], []
-    covariance = np.zeros((scenario.steps + 1, scenario.motion.state_size, scenario.motion.state_size))
+    covariance = np.zeros((scenario.steps + 1, n, n))
     for start in range(0, runs, RUNS_AT_ONCE):
         part = Draws(*(x[start : start + RUNS_AT_ONCE] for x in draws))
         mean, spread = estimates(filter, scenario, part.measurements, part.sight, seed)
         errors.append(position_error(scenario, mean, part.states))
-        if mean.shape[-1] == scenario.motion.state_size:
+        if mean.shape[-1] == n:
             e = mean - part.states
             covariance += np.einsum("rki,rkj->kij", e, e) / runs
             if spread is not None:
                 nees.append(normalised_square(e, spread))
+        else:
+            covariance[:] = np.nan
         if progress is not None:
             progress(min(start + RUNS_AT_ONCE, runs), runs)
     error = np.concatenate(errors)

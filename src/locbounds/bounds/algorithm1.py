@@ -92,7 +92,7 @@ def _last_columns(scenario, J_z, horizon) -> Float[Array, "n state"]:
     n = scenario.motion.state_size
     size = n * (scenario.steps + 1)
     inside = jnp.arange(size) < (horizon + 1) * n
-    J = _prior_information(scenario, horizon).at[n:, n:].add(J_z.reshape(size - n, size - n))
+    J = jnp.asarray(_prior_information(scenario, horizon)).at[n:, n:].add(J_z.reshape(size - n, size - n))
     J = jnp.where(inside[:, None] & inside[None, :], J, jnp.eye(size))
     unit = jax.lax.dynamic_slice_in_dim(jnp.eye(size), horizon * n, n, axis=1)
     return jnp.linalg.solve(J, unit)

@@ -106,7 +106,7 @@ class _Window:
 
     def predict(self, S: Array, F: Array, Q: Array) -> Float[Array, "size size"]:
         T = self.shift(F)
-        return (T @ S @ T.T).at[: self.n, : self.n].add(Q)
+        return jnp.asarray(T @ S @ T.T).at[: self.n, : self.n].add(Q)
 
     def update(self, S: Array, D: Array) -> Float[Array, "size size"]:
         cross = S[:, self.observed]
