@@ -14,8 +14,13 @@ from locbounds.errors import LocboundsError
 BAD_INPUT = 2
 UNEXPECTED = 1
 INTERRUPTED = 130
-kept: list[Path] = []
-"""Files that the running command has finished; named after Ctrl-C."""
+_kept: list[Path] = []  # files that the running command has finished
+
+
+def name_after_ctrl_c(finished: list[Path]) -> None:
+    """Have the files of this list, which the running command still extends, named after Ctrl-C."""
+    global _kept
+    _kept = finished
 
 
 def fail(cause: str, remedy: str, code: int) -> NoReturn:
@@ -46,13 +51,13 @@ class Program(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command and explain its failure."""
-        kept.clear()
+        name_after_ctrl_c([])
         try:
             return super().invoke(ctx)
         except LocboundsError as error:
             fail(error.cause, error.remedy, BAD_INPUT)
         except KeyboardInterrupt:
-            names = ", ".join(str(path) for path in kept)
+            names = ", ".join(str(path) for path in _kept)
             fail("interrupted", f"kept what was finished: {names}" if names else "", INTERRUPTED)
         except (typer.TyperException, typer.Exit, typer.Abort, BrokenPipeError):
             raise

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from locbounds.cli import failures
+from locbounds.cli.failures import name_after_ctrl_c
 
 
 @contextmanager
@@ -17,7 +17,7 @@ def output_folder(path: Path, *, force: bool) -> Iterator[Any]:
     from locbounds.io.files import OutputFolder
 
     with OutputFolder(path, force=force) as out:
-        failures.kept = out.written
+        name_after_ctrl_c(out.written)
         yield out
 
 
@@ -66,13 +66,32 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def precision_progress(name: str) -> Iterator[Callable[[int, float, float], None]]:
-    """A progress bar on stderr with the precision reached so far; silent where stderr is not a terminal.
+    """A bar with the precision reached so far.
 
-    Yields the callback ``(samples, relative standard error, target)`` that the bounds take. Errors fall with the
-    square root of the samples, so the bar shows ``(target / error)^2``.
+    Yields the callback ``(samples, relative standard error, target)`` that bounds take. Errors fall with the square
+    root of the samples, so the bar shows ``(target / error)^2``.
     """
+    with _bar(name) as show:
+
+        def report(samples: int, error: float, target: float) -> None:
+            share = min(1.0, (target / error) ** 2) if error > 0 else 1.0
+            show(share, f"s.e. {error:.2%} of {target:.2%}, {samples:,} draws")
+
+        yield report
+
+
+@contextmanager
+def count_progress(name: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar for counted work; yields the callback ``(done, total)`` that :func:`locbounds.evaluate` takes."""
+    with _bar(name) as show:
+        yield lambda done, total: show(done / total, f"{done:,} of {total:,}")
+
+
+@contextmanager
+def _bar(name: str) -> Iterator[Callable[[float, str], None]]:
+    """A progress bar on stderr that vanishes when done; nothing where stderr is not a terminal."""
     if not sys.stderr.isatty():
-        yield lambda samples, error, target: None
+        yield lambda share, reached: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -80,9 +99,4 @@ def precision_progress(name: str) -> Iterator[Callable[[int, float, float], None
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[reached]}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(name, total=1.0, reached="compiling")
-
-        def report(samples: int, error: float, target: float) -> None:
-            share = min(1.0, (target / error) ** 2) if error > 0 else 1.0
-            bar.update(task, completed=share, reached=f"s.e. {error:.2%} of {target:.2%}, {samples:,} draws")
-
-        yield report
+        yield lambda share, reached: bar.update(task, completed=share, reached=reached)

@@ -1,1 +1,1 @@
-"""What people look at: descriptions and figures."""
+"""What people look at: figures, tables and descriptions."""
