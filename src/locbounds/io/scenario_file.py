@@ -109,7 +109,7 @@ def _hoisted(keys: dict[str, Any]) -> dict[str, Any]:
 
 
 TEACHING = {
-    "format": "unit suffixes in the keys: m, s, m_s = m/s; a wrong unit is an unknown key",
+    "format": "units are in the keys: m, s, m_s is m/s; a wrong unit is an unknown key",
     "time.steps": "results at steps 0..steps; step 0 is the prior",
     "time.times_s": "times of steps 0, 1, ...; step 0 is the prior",
     "motion.model": "constant velocity disturbed by white acceleration",

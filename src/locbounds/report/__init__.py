@@ -1,1 +1,1 @@
-"""Figures and tables of results."""
+"""Results for people: figures, tables, files, and scenarios in words."""
