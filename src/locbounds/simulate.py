@@ -15,7 +15,7 @@ from locbounds.noise import Noise
 from locbounds.precision import double_precision
 from locbounds.scenario import Scenario
 
-RUNS_PER_BLOCK = 256
+RUNS_PER_BLOCK = 1024
 
 
 class Draws(NamedTuple):

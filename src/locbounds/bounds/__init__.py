@@ -1,0 +1,8 @@
+"""Bounds: one family per file."""
+
+from locbounds.bounds.algorithm1 import bcrb_algorithm1
+from locbounds.bounds.bcrb import bcrb, known_sight
+from locbounds.bounds.conditional import enumer, los_only
+from locbounds.bounds.expectation import AlongTrack, Expectation, Prior
+
+__all__ = ["AlongTrack", "Expectation", "Prior", "bcrb", "bcrb_algorithm1", "enumer", "known_sight", "los_only"]

@@ -1,0 +1,236 @@
+"""Bayesian Cramér-Rao bounds of jump-Markov and known-sight models, with noise and geometry separated."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from locbounds.axes import Array, Float
+from locbounds.blocks import GROUPS, Stream, block_key, check_seed
+from locbounds.bounds.common import bound_result, prepare
+from locbounds.bounds.expectation import Expectation, directions, windows
+from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
+from locbounds.bounds.recursion import covariance_recursion
+from locbounds.bounds.score_covariance import NoiseProcess, noise_process, score_covariance_increments
+from locbounds.precision import double_precision, traced
+from locbounds.result import Result
+from locbounds.scenario import Scenario
+
+PATHS = 64  # noise paths per group and block
+TRACKS = 16  # tracks per group and block: the geometry varies far less than the noise
+FIRST_WINDOW = 8
+TABLE_BYTES = 2.5e8  # the increments of one link, all groups, stay below this
+
+
+def _same(a: NoiseProcess, b: NoiseProcess) -> bool:
+    leaves_a, tree_a = jax.tree.flatten(a)
+    leaves_b, tree_b = jax.tree.flatten(b)
+    return tree_a == tree_b and all(np.array_equal(x, y) for x, y in zip(leaves_a, leaves_b, strict=True))
+
+
+def _distinct(processes: list[NoiseProcess]) -> list[int]:
+    """For every process the index of the first equal one, so that equal links share their draws' work."""
+    if traced(processes):
+        return list(range(len(processes)))
+    first: list[int] = []
+    for i, process in enumerate(processes):
+        first.append(next((j for j in first if _same(processes[j], process)), i))
+    return first
+
+
+@partial(jax.jit, static_argnames=("groups", "window"))
+def _geometry(scenario, expectation, seed, block, *, groups, window) -> Float[Array, "links groups steps w space w space"]:
+    """Group means of ``grad h(x_n) grad h(x_n')^T`` over the window at every step."""
+    paths = groups * TRACKS if expectation.random else 1
+    u = directions(scenario, expectation, block_key(seed, Stream.TRACKS, block), paths)
+    u = u.reshape(u.shape[0], groups if expectation.random else 1, -1, *u.shape[2:])
+    u = windows(u, window)
+    return jnp.einsum("lgnkia,lgnkjb->lgkiajb", u, u) / u.shape[2]
+
+
+@jax.jit
+def _estimate(scenario, C, G, which) -> Estimate:
+    """Bound at every step, and each group's deviation of the position mean square error (delta method)."""
+    C_mean, G_mean = C.mean(1), G.mean(1)
+    index = np.array(scenario.motion.position_index)
+
+    def information(C, G):
+        return jnp.einsum("lkij,lkiajb->kiajb", C[which], G)
+
+    def position_mse(J):
+        P = covariance_recursion(scenario, J)
+        return P[:, index, index].sum(-1), P
+
+    mse, tangent, P = jax.linearize(position_mse, information(C_mean, G_mean), has_aux=True)
+
+    def deviation(group):  # independent draws of noise and geometry: their deviations add
+        C_group, G_group = group
+        return tangent(information(C_group - C_mean, G_mean) + information(C_mean, G_group - G_mean))
+
+    G = jnp.broadcast_to(G, (G.shape[0], C.shape[1], *G.shape[2:]))
+    replicates = jax.lax.map(deviation, (jnp.moveaxis(C, 1, 0), jnp.moveaxis(G, 1, 0)), batch_size=8)
+    return Estimate(P, mse, replicates)
+
+
+def _truncation(estimate, scenario, tables, which) -> float:
+    """Largest relative change of the position RMSE when the window is shortened by a quarter."""
+    C, G = tables
+    cut = -(-3 * C.shape[-1] // 4)
+    shorter = _estimate(
+        scenario, C.mean(1, keepdims=True)[..., :cut, :cut], G.mean(1, keepdims=True)[..., :cut, :, :cut, :], which
+    )
+    return float(jnp.max(jnp.abs(jnp.sqrt(shorter.position_mse / estimate.position_mse) - 1)))
+
+
+@double_precision
+def bcrb(
+    scenario: Scenario,
+    *,
+    rtol: float | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    expectation: Expectation | None = None,
+    window: int | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    r"""Bayesian Cramér-Rao bound of a jump-Markov measurement model, at every step.
+
+    The information of the ranges is separated into the covariance of the noise score, a property of each link's noise
+    process (see :mod:`locbounds.bounds.score_covariance`), and the expected products of range gradients. Modes are
+    never enumerated; links with equal noise processes share their noise draws.
+
+    Parameters
+    ----------
+    scenario
+        The model. Chains and noises of different links are independent.
+    rtol
+        Largest relative standard error of the position RMSE over the steps; draws are added until it is reached.
+        Default 1e-3.
+    samples
+        A fixed number of noise paths instead (rounded up to whole blocks of 2048).
+    seed
+        Seed of the random numbers.
+    expectation
+        Where range gradients are taken: ``Prior()`` (default, the Bayesian bound) or ``AlongTrack(positions)``.
+    window
+        How many steps back a measurement's information correlates with that of others; by default it grows until
+        shortening it by a quarter changes no step by more than ``rtol / 10``.
+    progress
+        Called with (samples, precision reached, target) after every look.
+
+    Returns
+    -------
+    Result
+        ``covariance`` [steps+1, state, state] is the bound on the mean square error matrix of any estimator of x_k
+        from z_1..z_k. ``diagnostics["truncation"]`` is the relative change of the position RMSE, at the worst step,
+        when the window is shortened by a quarter: an estimate from above of the error made by truncating at the
+        window itself, since the entries left out decay geometrically.
+
+    Raises
+    ------
+    RefusedError
+        If an assumption is violated (see ``locbounds explain bcrb``).
+    InputError
+        If an option makes no sense.
+
+    Notes
+    -----
+    Fritsche 2013, eqs. 2 to 9, with Louis' identity in place of products of scores.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> bound = lb.bcrb(lb.papers.fritsche2013.scenario(stay=0.9), seed=0)
+    >>> bool(abs(bound.mean_position_rmse() - 51.2) < 0.2)
+    True
+    """
+    return separated("bcrb", scenario, rtol, samples, seed, expectation, window, progress)
+
+
+@double_precision
+def known_sight(
+    scenario: Scenario,
+    *,
+    rtol: float | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    expectation: Expectation | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Posterior Cramér-Rao bound for a known sight schedule.
+
+    Parameters
+    ----------
+    scenario, rtol, samples, seed, expectation, progress
+        As for :func:`bcrb`; every link's sight is a :class:`~locbounds.KnownSight`. With
+        ``AlongTrack(positions)`` nothing is random and the number is conditional on the track.
+
+    Returns
+    -------
+    Result
+        ``covariance`` [steps+1, state, state]: with the default expectation a bound on the mean square error matrix
+        of every estimator that is told the sight.
+
+    Raises
+    ------
+    RefusedError
+        If the sight of some link is random.
+
+    Notes
+    -----
+    Chen 2010, eq. 18, with the expectation over tracks taken by Monte Carlo. The same computation as :func:`bcrb`:
+    with certain modes the score covariance is diagonal and exact.
+
+    Examples
+    --------
+    >>> import numpy as np, locbounds as lb
+    >>> scenario = lb.papers.fritsche2013.scenario().with_known_sight(np.zeros(100, int))
+    >>> bool(lb.known_sight(scenario).mean_position_rmse() < 45)
+    True
+    """
+    return separated("known-sight", scenario, rtol, samples, seed, expectation, 1, progress)
+
+
+def separated(id, scenario, rtol, samples, seed, expectation, window, progress) -> Result:
+    """The engine: blocks of score covariances and geometries until window and precision suffice."""
+    expectation, verdict = prepare(id, scenario, expectation)
+    rtol_target = check_rtol(rtol, samples)
+    seed_key = np.uint32(check_seed(seed))
+    processes = [noise_process(scenario, link) for link in scenario.links]
+    first = _distinct(processes)
+    distinct = sorted(set(first))
+    which = np.array([distinct.index(i) for i in first])
+    size = min(FIRST_WINDOW if window is None else window, scenario.steps)
+    fixed = samples is not None or traced(scenario, expectation)
+    while True:
+        groups = int(np.clip(TABLE_BYTES // (8 * scenario.steps * size**2), 8, GROUPS))
+        blocks = -(-(samples or 1) // (groups * PATHS)) if fixed else None
+
+        def draw(block: int, groups: int = groups, size: int = size):
+            b = np.uint32(block)
+            C = [
+                score_covariance_increments(processes[i], seed_key, b, groups=groups, paths=PATHS, window=size)
+                for i in distinct
+            ]
+            return jnp.stack(C), _geometry(scenario, expectation, seed_key, b, groups=groups, window=size)
+
+        def evaluate(tables):
+            return _estimate(scenario, *tables, which)
+
+        truncation = 0.0
+        if window is None and size < scenario.steps and not traced(scenario, expectation):
+            tables = draw(0)
+            truncation = _truncation(evaluate(tables), scenario, tables, which)
+            if truncation > rtol_target / 10:
+                size = min(2 * size, scenario.steps)
+                continue
+        estimate, done = refine(
+            draw, evaluate, rtol=rtol_target, blocks=blocks, samples_per_block=groups * PATHS, progress=progress
+        )
+        break
+    how = f"noise and geometry separated, Louis' identity, window of {size} steps"
+    diagnostics = {"truncation": np.float64(truncation), "window": np.int64(size)}
+    return bound_result(
+        id, scenario, estimate, verdict, expectation, seed, done * groups * PATHS, how, diagnostics
+    )

@@ -1,0 +1,5 @@
+"""The papers: one file each, with their scenarios, published numbers, tables and figures."""
+
+from locbounds.papers import fritsche2013
+
+__all__ = ["fritsche2013"]

@@ -1,0 +1,256 @@
+"""The one result type of bounds and filters: labelled, with standard errors and provenance."""
+
+import datetime
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from locbounds.axes import Array, Float
+from locbounds.errors import InputError, RefusedError
+from locbounds.precision import traced
+from locbounds.quadrature import standard_error
+from locbounds.verdict import Status, Verdict
+
+if TYPE_CHECKING:
+    import xarray
+
+NORMAL_95 = 1.959963984540054  # 97.5 % quantile of the standard normal law
+
+
+class Provenance(eqx.Module):
+    """Where a number comes from.
+
+    Attributes
+    ----------
+    seed, samples
+        Seed and number of Monte Carlo draws (0 where nothing is drawn).
+    how
+        The engine or estimator, in words.
+    references
+        Citation keys.
+    versions
+        Versions of the libraries that matter.
+    """
+
+    seed: int = eqx.field(static=True)
+    samples: int = eqx.field(static=True)
+    how: str = eqx.field(static=True)
+    references: tuple[str, ...] = eqx.field(static=True)
+    versions: tuple[tuple[str, str], ...] = eqx.field(static=True, default=())
+    date: str = eqx.field(static=True, default="")
+
+    @classmethod
+    def now(cls, seed: int, samples: int, how: str, references: tuple[str, ...]) -> "Provenance":
+        """Provenance with today's versions and date."""
+        names = ("locbounds", "jax", "numpy")
+        return cls(
+            seed, samples, how, references, tuple((n, version(n)) for n in names if n != "locbounds"), datetime.date.today().isoformat()
+        )
+
+
+class Result(eqx.Module):
+    """Accuracy over time, of a bound or of a filter.
+
+    Everything estimated carries its spread over ``groups`` independent groups of draws, from which the standard error
+    of any average follows; a deterministic number has one group and the error zero.
+
+    Attributes
+    ----------
+    id, name, kind
+        Method id (``bcrb``, ``imm-ekf``), display name, ``"bound"`` or ``"filter"``.
+    sees
+        What an estimator that this number speaks of may see (``ranges``: past and present ranges; ``sight``).
+    time_s
+        [steps+1] seconds, step 0 first.
+    position_mse
+        [steps+1] m^2: sum of the position coordinates' mean square errors (or its bound).
+    replicates
+        [groups, steps+1] deviation of each group's ``position_mse`` from the mean.
+    covariance
+        [steps+1, state, state] bound on (or estimate of) the mean square error matrix, in the state's units.
+    verdict, provenance
+        Whether the number may be quoted; where it comes from.
+    track
+        Label of the one track that the number is conditional on, or an empty string.
+    diagnostics
+        Further arrays by name, each explained in the docs of its producer.
+    """
+
+    id: str = eqx.field(static=True)
+    name: str = eqx.field(static=True)
+    kind: str = eqx.field(static=True)
+    sees: frozenset[str] = eqx.field(static=True)
+    time_s: Float[Array, " steps+1"]
+    position_mse: Float[Array, " steps+1"]
+    replicates: Float[Array, "groups steps+1"]
+    covariance: Float[Array, "steps+1 state state"]
+    verdict: Verdict = eqx.field(static=True)
+    provenance: Provenance = eqx.field(static=True)
+    track: str = eqx.field(static=True, default="")
+    diagnostics: dict[str, Any] = eqx.field(default_factory=dict)
+
+    def _label(self, values: Array, name: str, units: str = "m") -> "xarray.DataArray":
+        import xarray
+
+        coords = {"step": np.arange(len(self.time_s)), "time_s": ("step", np.asarray(self.time_s))}
+        return xarray.DataArray(
+            np.asarray(values), coords, ("step",), name, {"units": units, "method": self.id, "kind": self.kind}
+        )
+
+    @property
+    def position_rmse(self) -> "xarray.DataArray":
+        """Root mean square position error per step, in metres."""
+        return self._label(np.sqrt(self.position_mse), "position_rmse")
+
+    @property
+    def position_rmse_stderr(self) -> "xarray.DataArray":
+        """Standard error of :attr:`position_rmse`, in metres."""
+        return self._label(standard_error(self._rmse_replicates()), "position_rmse_stderr")
+
+    def _rmse_replicates(self) -> Float[Array, "groups steps+1"]:
+        root = np.sqrt(np.asarray(self.position_mse))
+        return np.asarray(self.replicates) / (2 * np.where(root > 0, root, 1.0))
+
+    def mean_position_rmse(self, first_step: int = 0) -> Float[Array, ""]:
+        """Position RMSE in metres averaged over the steps from ``first_step`` on (0 includes the prior)."""
+        if not 0 <= first_step < len(self.position_mse):
+            raise InputError(f"first_step is {first_step}", f"Give a step from 0 to {len(self.position_mse) - 1}")
+        root = jnp.sqrt if traced(self.position_mse) else np.sqrt
+        return root(self.position_mse[first_step:]).mean()
+
+    def mean_position_rmse_stderr(self, first_step: int = 0) -> float:
+        """Standard error of :meth:`mean_position_rmse`, computed on the average, not per step."""
+        return float(standard_error(self._rmse_replicates()[:, first_step:].mean(axis=1)))
+
+    def relative_stderr(self) -> float:
+        """Largest relative standard error of the position RMSE over the steps: what ``rtol`` limits."""
+        root = np.sqrt(np.asarray(self.position_mse))
+        return float(np.max(standard_error(self._rmse_replicates()) / np.where(root > 0, root, 1.0)))
+
+    def efficiency(self, bound: "Result") -> "Efficiency":
+        """Mean square error of the bound over that of this filter, averaged over the steps, with a 95 % interval.
+
+        Raises
+        ------
+        RefusedError
+            If the bound does not bound this filter: it assumes less than the filter sees, belongs to one track, was
+            refused, or stands on other time steps.
+        """
+        if bound.kind != "bound" or self.kind != "filter":
+            raise RefusedError(
+                f"efficiency compares a filter with a bound, not a {self.kind} ({self.name}) with a {bound.kind} "
+                f"({bound.name})",
+                "Call filter_result.efficiency(bound_result)",
+            )
+        if not self.sees <= bound.sees:
+            raise RefusedError(
+                f"{self.name} sees {', '.join(sorted(self.sees - bound.sees))}, which {bound.name} assumes to be "
+                "unknown: the filter may be better than this bound",
+                "Use a bound that assumes at least as much, for example enumer for a filter told the sight",
+            )
+        if self.track != bound.track:
+            raise RefusedError(
+                f"{bound.name} is conditional on {bound.track or 'no track'}, {self.name} on {self.track or 'no track'}",
+                "A Bayesian bound holds over tracks drawn from the model: compare like with like",
+            )
+        if bound.verdict.status is Status.REFUSED:
+            raise RefusedError(f"{bound.name} was refused: {bound.verdict}", "Choose a bound that applies")
+        if not np.array_equal(self.time_s, bound.time_s):
+            raise RefusedError("the time steps of filter and bound differ", "Compute both on one scenario")
+        log_ratio = np.log(np.mean(bound.position_mse) / np.mean(self.position_mse))
+        spreads = [
+            float(standard_error(np.mean(r.replicates, axis=1)) / np.mean(r.position_mse)) for r in (bound, self)
+        ]
+        half = NORMAL_95 * float(np.hypot(*spreads))
+        return Efficiency(*(float(np.exp(log_ratio + d)) for d in (0.0, -half, half)))
+
+    def to_dataset(self) -> "xarray.Dataset":
+        """All arrays with labels, units and provenance, as an xarray dataset."""
+        import xarray
+
+        data = {
+            "position_rmse": self.position_rmse,
+            "position_rmse_stderr": self.position_rmse_stderr,
+            "position_mse": self._label(self.position_mse, "position_mse", "m2"),
+            "covariance": (("step", "state_row", "state_column"), np.asarray(self.covariance)),
+            "replicates": (("group", "step"), np.asarray(self.replicates)),
+        }
+        p = self.provenance
+        attrs = {
+            "method": self.id,
+            "name": self.name,
+            "kind": self.kind,
+            "sees": ", ".join(sorted(self.sees)),
+            "verdict": str(self.verdict),
+            "track": self.track,
+            "seed": p.seed,
+            "samples": p.samples,
+            "how": p.how,
+            "references": ", ".join(p.references),
+            "versions": ", ".join(f"{n} {v}" for n, v in p.versions),
+            "date": p.date,
+        }
+        return xarray.Dataset(data, attrs=attrs)
+
+    def __str__(self) -> str:
+        if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(self)):
+            return f"{self.name}: traced"
+        what = f"{self.name}: position RMSE {format_with_error(self.mean_position_rmse(), self.mean_position_rmse_stderr())}"
+        where = f" along {self.track}" if self.track else ""
+        return f"{what}, mean over steps 0..{len(self.time_s) - 1}{where}; {self.verdict}"
+
+
+class Efficiency(eqx.Module):
+    """Ratio of mean square errors, bound over filter, with a 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        return f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}]"
+
+
+def format_with_error(value: Any, error: float, unit: str = "m") -> str:
+    """A number with its standard error, rounded to two digits of the error.
+
+    >>> format_with_error(51.2345, 0.034), format_with_error(3.0, 0.0)
+    ('51.234 +- 0.034 m', '3.000 m')
+    """
+    if error <= 1e-12 * abs(float(value)):  # nothing random, up to rounding
+        return f"{float(value):.3f} {unit}"
+    digits = max(0, 1 - int(np.floor(np.log10(error))))
+    return f"{float(value):.{digits}f} +- {error:.{digits}f} {unit}"
+
+
+def tightest(bounds: "list[Result] | tuple[Result, ...]") -> list[Result]:
+    """The largest of the valid bounds that hold for estimators which see the ranges only, compared by average RMSE.
+
+    Bounds within four standard errors of the largest are returned with it: none of them is tighter than the other
+    as far as the draws can tell. Refused bounds and numbers conditional on a track are left out.
+
+    Parameters
+    ----------
+    bounds
+        Results of bounds for one scenario.
+
+    Returns
+    -------
+    list of Result
+        Largest first; empty if none is valid.
+    """
+    valid = [b for b in bounds if b.kind == "bound" and b.verdict.status is Status.VALID]
+    if not valid:
+        return []
+    valid.sort(key=lambda b: -float(b.mean_position_rmse()))
+    top = valid[0]
+
+    def close(b: Result) -> bool:
+        gap = float(top.mean_position_rmse() - b.mean_position_rmse())
+        return gap <= 4 * float(np.hypot(top.mean_position_rmse_stderr(), b.mean_position_rmse_stderr()))
+
+    return [b for b in valid if b is top or close(b)]

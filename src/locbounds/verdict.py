@@ -1,0 +1,154 @@
+"""Verdicts: whether a bound may be quoted for a scenario, computed from assumptions that are predicates."""
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from locbounds.axes import LOS, NLOS
+from locbounds.precision import double_precision, traced
+from locbounds.scenario import Scenario
+from locbounds.sight import DwellSight, KnownSight, MarkovSight
+
+NEARLY_CERTAIN = 1e-3  # a chain that changes (or keeps) its mode less often than this per step is called deterministic
+NO_INFORMATION = 1e-3  # an NLOS mode with less than this share of the LOS information carries none
+
+
+class Status(StrEnum):
+    """What a verdict says."""
+
+    VALID = "valid"
+    CONDITIONAL = "valid under"
+    REFUSED = "refused"
+
+
+class Assumption(NamedTuple):
+    """One assumption of a bound.
+
+    Attributes
+    ----------
+    text
+        What is assumed, in words.
+    violated
+        Predicate: the reason why a scenario violates it, or None.
+    """
+
+    text: str
+    violated: Callable[[Scenario], str | None]
+
+
+class Verdict(NamedTuple):
+    """Whether a bound applies, and why.
+
+    Attributes
+    ----------
+    status
+        Valid, valid under conditions, or refused.
+    reasons
+        One sentence each: grounds, conditions or violations.
+    warnings
+        What is legal but dangerous.
+    """
+
+    status: Status
+    reasons: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        text = f"{self.status} ({'; '.join(self.reasons)})" if self.reasons else str(self.status)
+        return text + "".join(f"\nwarning: {warning}" for warning in self.warnings)
+
+
+def judge(
+    assumptions: tuple[Assumption, ...], scenario: Scenario, *, grounds: tuple[str, ...], conditions: tuple[str, ...]
+) -> Verdict:
+    """Verdict of a method with these assumptions for a scenario.
+
+    Parameters
+    ----------
+    assumptions
+        Checked in turn; a violation refuses.
+    grounds
+        Why the bound holds when nothing is violated.
+    conditions
+        What the number depends on beyond the model (for example one measured track).
+    """
+    violations = tuple(reason for a in assumptions if (reason := a.violated(scenario)) is not None)
+    if violations:
+        return Verdict(Status.REFUSED, violations)
+    status = Status.CONDITIONAL if conditions else Status.VALID
+    return Verdict(status, conditions or grounds, dangers(scenario))
+
+
+def regular_noise(scenario: Scenario) -> str | None:
+    """Why the Fisher information of some noise does not exist, or None."""
+    for link in scenario.links:
+        for noise in link.noises:
+            regularity = noise.regularity()
+            if not regularity.finite:
+                return f"the noise of anchor {link.name} has no finite Fisher information: {regularity.reason}"
+    return None
+
+
+def all_sights_known(scenario: Scenario) -> str | None:
+    """Which anchor has no known sight schedule, or None."""
+    unknown = [link.name for link in scenario.links if not isinstance(link.sight, KnownSight)]
+    if unknown:
+        return (
+            f"the sight of {', '.join(unknown)} is random: give a known schedule (sight = {{ known = ... }}, "
+            "Scenario.with_known_sight) or use enumer, which averages over schedules"
+        )
+    return None
+
+
+def two_modes(scenario: Scenario) -> str | None:
+    """Which anchor has other modes than LOS and NLOS, or None."""
+    other = [link.name for link in scenario.links if len(link.noises) != 2]
+    return f"anchors {', '.join(other)} do not have exactly the modes LOS and NLOS" if other else None
+
+
+SMOOTH_NOISE = Assumption("every noise has a finite Fisher information about a shift", regular_noise)
+KNOWN_SIGHT = Assumption("the sight of every link is known at every step", all_sights_known)
+LOS_AND_NLOS = Assumption("every link is either LOS or NLOS", two_modes)
+
+
+@double_precision
+def dangers(scenario: Scenario) -> tuple[str, ...]:
+    """What is legal but dangerous in a scenario, one sentence each.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> dangers(lb.papers.fritsche2013.scenario())
+    ()
+    """
+    if traced(scenario):
+        return ()
+    found: dict[str, list[str]] = {}
+    intervals = scenario.times.intervals
+    for link in scenario.links:
+        if isinstance(link.sight, MarkovSight | DwellSight):
+            stay = np.asarray(link.sight.transitions(intervals))
+            stay = np.diagonal(stay, axis1=1, axis2=2)
+            if np.min(np.minimum(stay, 1 - stay)) < NEARLY_CERTAIN and scenario.steps > 1:
+                text = (
+                    "the chain is nearly deterministic: simulated tracks seldom see the rare change, "
+                    "so that standard errors may be too small"
+                )
+                found.setdefault(text, []).append(link.name)
+        if len(link.noises) == 2:
+            los, nlos = (float(noise.information()) for noise in link.noises)
+            if nlos < NO_INFORMATION * los:
+                text = (
+                    f"NLOS ranges carry less than {NO_INFORMATION:g} of the information of LOS ranges: accuracy "
+                    "comes from the LOS share alone"
+                )
+                found.setdefault(text, []).append(link.name)
+            if los < nlos:
+                text = f"mode {NLOS} (NLOS) is more informative than mode {LOS} (LOS): check that they are not swapped"
+                found.setdefault(text, []).append(link.name)
+        if np.array_equal(link.measurement.anchor, scenario.motion.position(scenario.prior.mean)):
+            text = "the prior's mean is exactly at the anchor, where a range has no direction"
+            found.setdefault(text, []).append(link.name)
+    return tuple(f"anchor {', '.join(names)}: {text}" for text, names in found.items())
