@@ -19,7 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from locbounds.axes import Array, Float, ndarray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize
 
 from locbounds.errors import InputError
 from locbounds.precision import double_precision
@@ -38,10 +38,11 @@ class MotionFit:
         Power spectral density of the white acceleration, m^2/s^3, the same on all axes.
     stderr : float
         Its standard error, from the scores of the tracks (robust to a wrong model); NaN with one track.
-    truth_std_m : float
-        The deviation of the true positions that was assumed, m.
+    truth_std_m, truth_std_stderr : float
+        Deviation of the true positions from the model's path, independent from one to the next, m, and its standard
+        error (NaN if given).
     straight_share : float
-        Share of steps at which the velocity of the truth does not change within ``truth_std_m``.
+        Share of steps at which the velocity of the truth does not change within twice that deviation.
     tracks, steps : int
         What was fitted to.
     notes : tuple of str
@@ -50,17 +51,16 @@ class MotionFit:
     psd_m2_s3: float
     stderr: float
     truth_std_m: float
+    truth_std_stderr: float
     straight_share: float
     tracks: int
     steps: int
     notes: tuple[str, ...] = ()
 
 
-def _log_likelihood(
-    log_q: Float[Array, ""], r2: Float[Array, ""], t: Float[Array, "n"], x: Float[Array, "n space"]
-) -> Float[Array, ""]:
-    """log p(x_2.. | x_0, x_1) of positions at times t; NaN times at the end are padding."""
-    q = jnp.exp(log_q)
+def _log_likelihood(theta: Float[Array, "2"], t: Float[Array, "n"], x: Float[Array, "n space"]) -> Float[Array, ""]:
+    """log p(x_2.. | x_0, x_1) of positions at times t, theta = log (q, r^2); NaN times at the end are padding."""
+    q, r2 = jnp.exp(theta)
     dt = jnp.diff(t)
     ok = jnp.isfinite(dt)
     dt, x = jnp.where(ok, dt, 1.0), jnp.where(jnp.isfinite(x), x, 0.0)
@@ -87,11 +87,16 @@ def _log_likelihood(
 
 @cache
 def _kernel():
-    return jax.jit(jax.vmap(jax.value_and_grad(_log_likelihood), (None, None, 0, 0)))
+    return jax.jit(jax.vmap(jax.value_and_grad(_log_likelihood), (None, 0, 0)))
+
+
+@cache
+def _values():
+    return jax.jit(jax.vmap(jax.vmap(_log_likelihood, (None, 0, 0)), (0, None, None)))
 
 
 @double_precision
-def fit_psd(times_s, positions_m, *, truth_std_m: float = 1e-3) -> MotionFit:
+def fit_psd(times_s, positions_m, *, truth_std_m: float | None = None) -> MotionFit:
     """Intensity of the constant-velocity model by maximum likelihood, pooled over tracks and axes.
 
     Parameters
@@ -100,8 +105,9 @@ def fit_psd(times_s, positions_m, *, truth_std_m: float = 1e-3) -> MotionFit:
         Times of each track, s, increasing.
     positions_m : sequence of arrays [n, space]
         True positions, m.
-    truth_std_m : float
-        Known deviation of the true positions, independent from one to the next, m.  Zero is allowed.
+    truth_std_m : float, optional
+        Deviation of the true positions, independent from one to the next, m; zero is allowed.  Default: estimated
+        too.  It matters: jitter of the truth that is taken for motion makes the intensity far too large.
 
     Returns
     -------
@@ -114,19 +120,20 @@ def fit_psd(times_s, positions_m, *, truth_std_m: float = 1e-3) -> MotionFit:
 
     Notes
     -----
-    A truth interpolated between corner points has no acceleration but at the corners; the estimate is then the
-    mean squared change of velocity per second, which is right for the model's covariance on the time scale of a leg,
-    and says little about single steps.
+    A truth interpolated between corner points has no acceleration but at the corners; the estimate is then about the
+    mean squared change of velocity per second, right for the covariance over a whole leg, too large within one and
+    too small at a corner.
 
     Examples
     --------
-    With exact velocity changes of deviation 0.1 m/s once a second, the intensity is near 0.01 m^2/s^3:
+    White acceleration of 0.01 m^2/s^3, by its exact integral over steps of one second:
 
     >>> rng = np.random.default_rng(0)
-    >>> t = np.arange(2000.0)
-    >>> x = np.cumsum(np.cumsum(0.1 * rng.normal(size=(2000, 2)), 0), 0)
-    >>> round(fit_psd([t], [x]).psd_m2_s3, 2)
-    0.01
+    >>> a = rng.multivariate_normal([0, 0], 0.01 * np.array([[1 / 3, 1 / 2], [1 / 2, 1]]), size=(4000, 2))
+    >>> v = np.cumsum(a[..., 1], 0) - a[..., 1]
+    >>> x = np.cumsum(v + a[..., 0], 0)
+    >>> round(fit_psd([np.arange(4000.0)], [x], truth_std_m=0).psd_m2_s3, 3)
+    0.010
     """
     pairs = [(np.asarray(t, float), np.asarray(x, float)) for t, x in zip(times_s, positions_m, strict=True)]
     pairs = [(t, x) for t, x in pairs if len(t) >= 3]
@@ -134,67 +141,96 @@ def fit_psd(times_s, positions_m, *, truth_std_m: float = 1e-3) -> MotionFit:
         raise InputError(
             "no track has three true positions: motion.psd_m2_s3 cannot be estimated", "Give a value for it"
         )
-    if not truth_std_m >= 0:
+    if truth_std_m is not None and not (np.isfinite(truth_std_m) and truth_std_m >= 0):
         raise InputError(f"truth_std_m is {truth_std_m}", "Give the deviation of the true positions in metres")
-    n, dim = max(len(t) for t, _ in pairs), pairs[0][1].shape[1]
-    t, x = np.full((len(pairs), n), np.nan), np.full((len(pairs), n, dim), np.nan)
-    turns = []  # change of velocity over the mean of both intervals' lengths, as a distance from the straight line
-    for i, (ti, xi) in enumerate(pairs):
-        t[i, : len(ti)], x[i, : len(ti)] = ti - ti[0], xi - xi[0]
-        dt = np.diff(ti)[:, None]
-        change = np.diff(np.diff(xi, axis=0) / dt, axis=0)
-        turns.append(np.column_stack([np.linalg.norm(change, axis=1), (dt[1:, 0] + dt[:-1, 0]) / 2]))
-    turn = np.concatenate(turns)
-    moment = float((turn[:, 0] ** 2).sum() / dim / turn[:, 1].sum())  # mean squared velocity change per second
-    limit = truth_std_m**2 / float(np.median(turn[:, 1])) ** 3  # what the jitter alone would look like
+    t, x, bend, span = _pad(pairs)
+    moment = float((bend**2).sum() / x.shape[-1] / span.sum())  # mean squared change of velocity per second, per axis
     if not moment > 0:
         raise InputError(
             "the true velocity never changes: motion.psd_m2_s3 cannot be estimated", "Give a value for it"
         )
-    arrays, r2, kernel = (jnp.asarray(t), jnp.asarray(x)), jnp.asarray(truth_std_m**2), _kernel()
+    arrays, kernel = (jnp.asarray(t), jnp.asarray(x)), _kernel()
 
-    def at(log_q: float):
-        value, score = kernel(jnp.asarray(log_q), r2, *arrays)
+    def at(theta):
+        value, score = kernel(jnp.asarray(theta), *arrays)
         return np.asarray(value), np.asarray(score)
 
-    low, high = np.log(moment) - 25.0, np.log(moment) + 5.0
-    coarse = np.linspace(low, high, 31)
-    best = coarse[int(np.argmax([at(g)[0].sum() for g in coarse]))]
-    found = minimize_scalar(
-        lambda g: -at(g)[0].sum(), bounds=(max(low, best - 1), min(high, best + 1)), method="bounded"
-    )
-    log_q = float(found.x)
-    if log_q < low + 0.5:
+    low, high = np.log(moment) - 25.0, np.log(moment) + 3.0
+    if truth_std_m is None:
+        jitter = 2 * np.log(np.sqrt(np.median((bend * span) ** 2)) + 1e-12)  # if all of it were the truth's
+        jitters = np.linspace(jitter - 12, jitter + 3, 11)
+        free = np.array([True, True])
+    else:
+        with np.errstate(divide="ignore"):
+            jitters = 2 * np.log(np.array([truth_std_m]))
+        free = np.array([True, False])
+    starts = np.array([[q, r] for r in jitters for q in np.linspace(low, high, 15)])
+    start = starts[int(np.argmax(np.asarray(_values()(jnp.asarray(starts), *arrays)).sum(1)))]
+
+    def whole(free_part):
+        theta = start.copy()
+        theta[free] = free_part
+        return theta
+
+    def cost(free_part):
+        value, score = at(whole(free_part))
+        return -value.sum(), -score.sum(0)[free]
+
+    box = [(low - 5, high), (jitters[0] - 5, jitters[-1] + 5)][: free.sum()]
+    found = minimize(cost, start[free], jac=True, method="L-BFGS-B", bounds=box, options={"ftol": 1e-13})
+    theta = whole(found.x)
+    if theta[0] < low:
         raise InputError(
-            f"the true velocity does not change by more than its error of {truth_std_m} m allows: "
-            "motion.psd_m2_s3 cannot be estimated",
-            "Give a value for it, or a smaller truth_std_m",
+            "the true velocity does not change by more than the error of the truth explains: motion.psd_m2_s3 "
+            "cannot be estimated",
+            "Give a value for it",
         )
-    score = at(log_q)[1]
-    curvature = (at(log_q - 1e-3)[1].sum() - at(log_q + 1e-3)[1].sum()) / 2e-3
-    g = len(pairs)
-    relative = np.sqrt((score**2).sum() * g / (g - 1)) / curvature if g > 1 else np.nan
-    straight = float(np.mean(turn[:, 0] * turn[:, 1] <= max(2 * truth_std_m, 1e-9)))
+    stderr = _stderr(at, theta, free)
+    q, r = np.exp(theta[0]), np.exp(theta[1] / 2)
+    straight = float(np.mean(bend * span <= 2 * r))
     notes = []
     if straight > STRAIGHT:
         notes.append(
-            f"The truth is a straight line at constant speed in {straight:.0%} of its steps, as if interpolated between "
-            "corner points: the intensity measures the corners, not the real walk, and may be too small."
-        )
-    if np.exp(log_q) < limit * 1e-3:
-        notes.append(
-            f"The assumed error of the truth, {truth_std_m:g} m, hides most single changes of velocity: the intensity "
-            "rests on changes that last."
+            f"The truth runs straight at constant speed in {straight:.0%} of its steps (within {2 * r:.2g} m), as if "
+            "interpolated between corner points: the intensity measures the corners, and the real walk may be livelier."
         )
     return MotionFit(
-        psd_m2_s3=float(np.exp(log_q)),
-        stderr=float(np.exp(log_q) * relative),
-        truth_std_m=float(truth_std_m),
+        psd_m2_s3=float(q),
+        stderr=float(q * stderr[0]),
+        truth_std_m=float(r),
+        truth_std_stderr=float(r / 2 * stderr[1]) if truth_std_m is None else float("nan"),
         straight_share=straight,
-        tracks=g,
+        tracks=len(pairs),
         steps=int(sum(len(t) - 1 for t, _ in pairs)),
         notes=tuple(notes),
     )
+
+
+def _pad(pairs):
+    """Padded times and positions; at every inner step the change of velocity and the time it took."""
+    n, dim = max(len(t) for t, _ in pairs), pairs[0][1].shape[1]
+    t, x = np.full((len(pairs), n), np.nan), np.full((len(pairs), n, dim), np.nan)
+    bend, span = [], []
+    for i, (ti, xi) in enumerate(pairs):
+        t[i, : len(ti)], x[i, : len(ti)] = ti - ti[0], xi - xi[0]
+        dt = np.diff(ti)
+        bend.append(np.linalg.norm(np.diff(np.diff(xi, axis=0) / dt[:, None], axis=0), axis=1))
+        span.append((dt[1:] + dt[:-1]) / 2)
+    return t, x, np.concatenate(bend), np.concatenate(span)
+
+
+def _stderr(at, theta, free) -> Float[ndarray, "2"]:
+    """Standard errors of the free parameters from the scores of the tracks, as in `maximum.covariances`."""
+    where, score = np.flatnonzero(free), at(theta)[1]
+    found = np.full(2, np.nan)
+    if len(score) < 2:
+        return found
+    step = 1e-3 * np.eye(2)[where]
+    h = np.stack([at(theta - d)[1].sum(0)[where] - at(theta + d)[1].sum(0)[where] for d in step]) / 2e-3
+    inverse = np.linalg.pinv(0.5 * (h + h.T), hermitian=True)
+    s = score[:, where]
+    found[where] = np.sqrt(np.diag(inverse @ (s.T @ s) @ inverse) * len(s) / (len(s) - 1))
+    return found
 
 
 def prior_from_tracks(

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtr
 
-from locbounds.axes import Array, Float, ndarray
+from locbounds.axes import Float, ndarray
 from locbounds.errors import InputError
 from locbounds.fit import switching
 from locbounds.fit.range_log import ErrorSequences, RangeLog
@@ -141,25 +141,30 @@ def autocorrelation(x: Float[ndarray, "sequences steps"], lags: tuple[int, ...])
 
 
 @cache
-def _kernel(which: str, stationary: bool, outliers: bool):
-    function = {"posterior": switching.posterior, "score": switching.predictive_score}[which]
-    return jax.jit(jax.vmap(partial(function, stationary=stationary, outliers=outliers), (None, 0, 0, 0)))
+def _kernel(stationary: bool, outliers: bool):
+    return jax.jit(jax.vmap(partial(switching.smooth, stationary=stationary, outliers=outliers), (None, 0, 0, 0)))
+
+
+class Smoothed(NamedTuple):
+    """What a fit makes of every error of a log.
+
+    Attributes
+    ----------
+    nlos : array [sequences, steps]
+        Posterior probability of NLOS, given all errors (and labels) of the sequence.
+    score : array [sequences, steps]
+        Normal scores of the one-step prediction; white and standard normal if the fit were true; NaN where missing.
+    """
+
+    nlos: Float[ndarray, "sequences steps"]
+    score: Float[ndarray, "sequences steps"]
 
 
 @double_precision
-def nlos_probability(fit: SightNoiseFit, errors: ErrorSequences) -> Float[Array | ndarray, "sequences steps"]:
-    """Posterior probability of NLOS at every time of every sequence, given all its errors and labels."""
-    kernel = _kernel("posterior", fit.stationary, fit.outliers)
-    return kernel(jnp.asarray(fit.theta), *(jnp.asarray(a) for a in errors[:3]))[..., 1]
-
-
-@double_precision
-def residuals(fit: SightNoiseFit, errors: ErrorSequences) -> Float[Array | ndarray, "sequences steps"]:
-    """Normal scores of the one-step prediction of every error; white and standard normal if the fit were true."""
-    unlabelled = np.full(errors.sight.shape, -1)
-    kernel = _kernel("score", fit.stationary, fit.outliers)
-    arrays = (jnp.asarray(a) for a in (errors.time_s, errors.error_m, unlabelled))
-    return kernel(jnp.asarray(fit.theta), *arrays)
+def smooth_errors(fit: SightNoiseFit, errors: ErrorSequences) -> Smoothed:
+    """Posterior of the sight and prediction residuals for the errors of a log."""
+    posterior, score = _kernel(fit.stationary, fit.outliers)(jnp.asarray(fit.theta), *map(jnp.asarray, errors[:3]))
+    return Smoothed(np.asarray(posterior)[..., 1], np.asarray(score))
 
 
 def fit_quality(
@@ -197,7 +202,8 @@ def fit_quality(
         if not len(e):
             continue
         centred[rows] -= e.mean()
-        scores[rows] = residuals(fit, part)
+        smoothed = smooth_errors(fit, part)
+        scores[rows] = smoothed.score
         f, n = _distribution(fit, e), len(e)
         mean, variance, between = _moments(fit)
         rate = 1 / fit.los_dwell_s + 1 / fit.nlos_dwell_s
@@ -215,7 +221,7 @@ def fit_quality(
                 quantiles_m=tuple(np.quantile(e, PROBABILITIES).tolist()),
                 fitted_quantiles_m=tuple(np.interp(PROBABILITIES, _distribution(fit, grid), grid).tolist()),
                 ks=float(max((np.arange(1, n + 1) / n - f).max(), (f - np.arange(n) / n).max())),
-                nlos_share=float(np.asarray(nlos_probability(fit, part))[there].mean()),
+                nlos_share=float(smoothed.nlos[there].mean()),
             )
         )
     longest = min(200, errors.error_m.shape[1] - 1)

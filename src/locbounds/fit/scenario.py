@@ -58,7 +58,7 @@ def fit_scenario(
     per_anchor: bool = False,
     outliers: bool = True,
     psd_m2_s3: float | None = None,
-    truth_std_m: float = 1e-3,
+    truth_std_m: float | None = None,
     prior: str | GaussianPrior = "area",
     title: str = "Fitted to a log of ranges",
 ) -> FittedScenario:
@@ -77,8 +77,8 @@ def fit_scenario(
         Whether both sights carry an outlier component.
     psd_m2_s3 : float, optional
         Acceleration intensity, if the truth cannot tell it.
-    truth_std_m : float
-        Known deviation of the true positions, m.
+    truth_std_m : float, optional
+        Deviation of the true positions, m; estimated if not given.
     prior : {"area", "start"} or GaussianPrior
         See `prior_from_tracks`.
     title : str
@@ -109,7 +109,7 @@ def fit_scenario(
         spread = "" if np.isnan(motion.stderr) else f", s.e. {motion.stderr:.2g}"
         comments["motion.psd_m2_s3"] = (
             f"maximum likelihood, true positions of {_count(motion.tracks, 'track')}, {motion.steps:,} steps{spread}; "
-            f"error of the truth taken as {motion.truth_std_m:g} m; {motion.straight_share:.0%} of its steps are straight"
+            f"error of the truth {'given' if truth_std_m is not None else 'estimated'} as {motion.truth_std_m:.2g} m"
         )
         notes += list(motion.notes)
     start = prior

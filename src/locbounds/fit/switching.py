@@ -145,36 +145,38 @@ def log_likelihood(
     return jnp.logaddexp(alpha[0], alpha[1])
 
 
-def posterior(theta, t, e, label, *, stationary: bool, outliers: bool) -> Float[Array, "steps 2"]:
-    """Pr(r_n = r | e_1..e_K): the derivative of the log likelihood by each log emission (no second recursion)."""
+def smooth(theta, t, e, label, *, stationary: bool, outliers: bool) -> tuple[Array, Array]:
+    """Posterior of the sight and one-step prediction of the errors, for one sequence.
+
+    Returns
+    -------
+    posterior : array [steps, 2]
+        Pr(r_n = r | e_1..e_K): the derivative of the log likelihood by each log emission, so that no second recursion
+        is needed.
+    score : array [steps]
+        Normal scores of the one-step prediction, Phi^-1(Pr(e_n' <= e_n | e_1..e_{n-1})): white and standard normal if
+        the law is true; NaN where missing.  Computed from the nearer tail, so that outliers stay finite.
+    """
     log_pi, log_p, log_b, valid = _pieces(theta, t, e, label, stationary, outliers)
 
     def value(log_b):
-        alpha = forward(log_pi, log_p, log_b, valid)[-1]
-        return jnp.logaddexp(alpha[0], alpha[1])
+        alpha = forward(log_pi, log_p, log_b, valid)
+        return jnp.logaddexp(alpha[-1, 0], alpha[-1, 1]), alpha
 
-    return jax.grad(value)(log_b)
-
-
-def predictive_score(theta, t, e, label, *, stationary: bool, outliers: bool) -> Float[Array, "steps"]:
-    """Normal scores of the one-step predictive law: ``Phi^-1(Pr(e_n' <= e_n | e_1..e_{n-1}))``; NaN where missing.
-
-    White standard normal if the fitted law is true.  Computed from the nearer tail, so that outliers stay finite.
-    """
-    log_pi, log_p, log_b, valid = _pieces(theta, t, e, label, stationary, outliers)
-    alpha = forward(log_pi, log_p, log_b, valid)
+    posterior, alpha = jax.grad(value, has_aux=True)(log_b)
     ahead = jnp.logaddexp(alpha[:-1, 0, None] + log_p[1:, 0], alpha[:-1, 1, None] + log_p[1:, 1])
     ahead = jnp.concatenate([log_pi[None], ahead])
     ahead = ahead - jnp.logaddexp(ahead[:, :1], ahead[:, 1:])
 
-    def log_tail(sign):
+    def tail(sign):
         u = jnp.stack([(e - theta[0]) * jnp.exp(-theta[1]), (e - theta[2]) * jnp.exp(-theta[3])], -1)
         log_f = log_ndtr(sign * u)
         if outliers:
             wide = jax.nn.log_sigmoid(theta[6]) + log_ndtr(sign * (e - theta[7]) * jnp.exp(-theta[8]))
             log_f = jnp.logaddexp(jax.nn.log_sigmoid(-theta[6]) + log_f, wide[:, None])
         f = ahead + log_f
-        return jnp.logaddexp(f[:, 0], f[:, 1])
+        return jnp.exp(jnp.logaddexp(f[:, 0], f[:, 1]))
 
-    low, high = jnp.exp(log_tail(1.0)), jnp.exp(log_tail(-1.0))
-    return jnp.where(low < high, jax.scipy.special.ndtri(low), -jax.scipy.special.ndtri(high))
+    low, high = tail(1.0), tail(-1.0)
+    ndtri = jax.scipy.special.ndtri
+    return posterior, jnp.where(low < high, ndtri(low), -ndtri(high))
