@@ -1,12 +1,23 @@
-from locbounds import papers
-from locbounds.bounds import AlongTrack, Prior, bcrb, bcrb_algorithm1, enumer, known_sight, los_only
-from locbounds.measurement import Range
-from locbounds.motion import ConstantVelocity
-from locbounds.noise import Gaussian, GaussianMixture
-from locbounds.priors import GaussianPrior
-from locbounds.result import Result, tightest
-from locbounds.scenario import Link, Scenario
-from locbounds.sight import DwellSight, KnownSight, MarkovSight
-from locbounds.simulate import simulate
-from locbounds.times import Times
-__version__="0.1.0"
+"""Accuracy bounds for locating a mobile over radio links that switch between line of sight and non-line of sight."""
+
+import lazy_loader
+
+__version__ = "0.1.0"
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(
+    __name__,
+    submodules=["papers"],
+    submod_attrs={
+        "bounds": ["AlongTrack", "Prior", "bcrb", "bcrb_algorithm1", "enumer", "known_sight", "los_only"],
+        "errors": ["InputError", "LocboundsError", "PrecisionError", "RefusedError"],
+        "measurement": ["Range"],
+        "motion": ["ConstantVelocity"],
+        "noise": ["Gaussian", "GaussianMixture"],
+        "priors": ["GaussianPrior"],
+        "result": ["Result", "tightest"],
+        "scenario": ["Link", "Scenario"],
+        "sight": ["DwellSight", "KnownSight", "MarkovSight"],
+        "simulation": ["Draws", "simulate"],
+        "times": ["Times"],
+    },
+)

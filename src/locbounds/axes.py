@@ -3,7 +3,8 @@
 =============  ==================================================================================
 axis           meaning
 =============  ==================================================================================
-``steps``      measurement times 1..K; arrays that include the prior's time 0 have ``steps+1`` rows
+``steps``      measurement times 1..K
+``times``      steps 0..K, the prior's included: ``steps+1`` rows
 ``state``      components of the mobile's state, positions first
 ``space``      2 or 3 position coordinates
 ``links``      anchors, in the scenario's order
@@ -16,12 +17,16 @@ axis           meaning
 =============  ==================================================================================
 """
 
-from jax import Array
+import jax
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 LOS, NLOS = 0, 1
-MODE_NAMES = ("los", "nlos")
 
-type_array = Array | ndarray
-__all__ = ["LOS", "MODE_NAMES", "NLOS", "Array", "Bool", "Float", "Int", "ndarray", "type_array"]
+Array = jax.Array | ndarray
+"""NumPy outside, JAX inside a kernel."""
+
+Scalar = Float[Array, ""] | float
+"""One number: an array without axes, or a float."""
+
+__all__ = ["LOS", "NLOS", "Array", "Bool", "Float", "Int", "Scalar", "ndarray"]

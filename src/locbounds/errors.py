@@ -10,6 +10,11 @@ class LocboundsError(Exception):
         What is wrong, with the offending value.
     remedy
         What to change.
+
+    Examples
+    --------
+    >>> str(InputError("the step is -1 s", "Give a positive number of seconds"))
+    'the step is -1 s. Give a positive number of seconds'
     """
 
     def __init__(self, cause: str, remedy: str = ""):

@@ -11,6 +11,8 @@ from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
 import jax
+import jax.core
+import jax.numpy as jnp
 import numpy as np
 
 from locbounds.errors import PrecisionError
@@ -30,7 +32,7 @@ def traced(*values: Any) -> bool:
 
 def _widen(leaf: Any) -> Any:
     """A concrete floating-point array as NumPy float64; anything else unchanged."""
-    if isinstance(leaf, jax.Array | np.ndarray) and not jax.dtypes.issubdtype(leaf.dtype, jax.dtypes.prng_key):
+    if isinstance(leaf, jax.Array | np.ndarray) and not jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key):
         array = np.asarray(leaf)
         return array.astype(np.float64) if array.dtype.kind == "f" else array
     return leaf

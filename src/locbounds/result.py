@@ -5,11 +5,10 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float
+from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError, RefusedError
 from locbounds.precision import traced
 from locbounds.quadrature import standard_error
@@ -48,7 +47,7 @@ class Provenance(eqx.Module):
         """Provenance with today's versions and date."""
         names = ("locbounds", "jax", "numpy")
         return cls(
-            seed, samples, how, references, tuple((n, version(n)) for n in names if n != "locbounds"), datetime.date.today().isoformat()
+            seed, samples, how, references, tuple((n, version(n)) for n in names), datetime.date.today().isoformat()
         )
 
 
@@ -78,16 +77,23 @@ class Result(eqx.Module):
         Label of the one track that the number is conditional on, or an empty string.
     diagnostics
         Further arrays by name, each explained in the docs of its producer.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> bound = lb.bcrb(lb.papers.fritsche2013.scenario(steps=10), seed=0)
+    >>> bound.position_rmse.sizes["step"], bound.kind, bound.verdict.status.value
+    (11, 'bound', 'valid')
     """
 
     id: str = eqx.field(static=True)
     name: str = eqx.field(static=True)
     kind: str = eqx.field(static=True)
     sees: frozenset[str] = eqx.field(static=True)
-    time_s: Float[Array, " steps+1"]
-    position_mse: Float[Array, " steps+1"]
-    replicates: Float[Array, "groups steps+1"]
-    covariance: Float[Array, "steps+1 state state"]
+    time_s: Float[Array, " times"]
+    position_mse: Float[Array, " times"]
+    replicates: Float[Array, "groups times"]
+    covariance: Float[Array, "times state state"]
     verdict: Verdict = eqx.field(static=True)
     provenance: Provenance = eqx.field(static=True)
     track: str = eqx.field(static=True, default="")
@@ -111,16 +117,15 @@ class Result(eqx.Module):
         """Standard error of :attr:`position_rmse`, in metres."""
         return self._label(standard_error(self._rmse_replicates()), "position_rmse_stderr")
 
-    def _rmse_replicates(self) -> Float[Array, "groups steps+1"]:
+    def _rmse_replicates(self) -> Float[Array, "groups times"]:
         root = np.sqrt(np.asarray(self.position_mse))
         return np.asarray(self.replicates) / (2 * np.where(root > 0, root, 1.0))
 
-    def mean_position_rmse(self, first_step: int = 0) -> Float[Array, ""]:
+    def mean_position_rmse(self, first_step: int = 0) -> Scalar:
         """Position RMSE in metres averaged over the steps from ``first_step`` on (0 includes the prior)."""
         if not 0 <= first_step < len(self.position_mse):
             raise InputError(f"first_step is {first_step}", f"Give a step from 0 to {len(self.position_mse) - 1}")
-        root = jnp.sqrt if traced(self.position_mse) else np.sqrt
-        return root(self.position_mse[first_step:]).mean()
+        return (jnp if traced(self.position_mse) else np).sqrt(self.position_mse[first_step:]).mean()
 
     def mean_position_rmse_stderr(self, first_step: int = 0) -> float:
         """Standard error of :meth:`mean_position_rmse`, computed on the average, not per step."""
@@ -154,19 +159,22 @@ class Result(eqx.Module):
             )
         if self.track != bound.track:
             raise RefusedError(
-                f"{bound.name} is conditional on {bound.track or 'no track'}, {self.name} on {self.track or 'no track'}",
+                f"{bound.name} belongs to {bound.track or 'random tracks'}, {self.name} to "
+                f"{self.track or 'random tracks'}",
                 "A Bayesian bound holds over tracks drawn from the model: compare like with like",
             )
         if bound.verdict.status is Status.REFUSED:
             raise RefusedError(f"{bound.name} was refused: {bound.verdict}", "Choose a bound that applies")
         if not np.array_equal(self.time_s, bound.time_s):
             raise RefusedError("the time steps of filter and bound differ", "Compute both on one scenario")
-        log_ratio = np.log(np.mean(bound.position_mse) / np.mean(self.position_mse))
+        log_ratio = float(np.log(np.mean(bound.position_mse) / np.mean(self.position_mse)))
         spreads = [
-            float(standard_error(np.mean(r.replicates, axis=1)) / np.mean(r.position_mse)) for r in (bound, self)
+            float(standard_error(np.asarray(r.replicates).mean(axis=1))) / float(np.mean(r.position_mse))
+            for r in (bound, self)
         ]
         half = NORMAL_95 * float(np.hypot(*spreads))
-        return Efficiency(*(float(np.exp(log_ratio + d)) for d in (0.0, -half, half)))
+        low, high = (float(np.exp(log_ratio + d)) for d in (-half, half))
+        return Efficiency(float(np.exp(log_ratio)), low, high)
 
     def to_dataset(self) -> "xarray.Dataset":
         """All arrays with labels, units and provenance, as an xarray dataset."""
@@ -197,11 +205,11 @@ class Result(eqx.Module):
         return xarray.Dataset(data, attrs=attrs)
 
     def __str__(self) -> str:
-        if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(self)):
+        if traced(self):
             return f"{self.name}: traced"
-        what = f"{self.name}: position RMSE {format_with_error(self.mean_position_rmse(), self.mean_position_rmse_stderr())}"
+        number = format_with_error(self.mean_position_rmse(), self.mean_position_rmse_stderr())
         where = f" along {self.track}" if self.track else ""
-        return f"{what}, mean over steps 0..{len(self.time_s) - 1}{where}; {self.verdict}"
+        return f"{self.name}: position RMSE {number}, mean over steps 0..{len(self.time_s) - 1}{where}; {self.verdict}"
 
 
 class Efficiency(eqx.Module):
@@ -242,6 +250,13 @@ def tightest(bounds: "list[Result] | tuple[Result, ...]") -> list[Result]:
     -------
     list of Result
         Largest first; empty if none is valid.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> scenario = lb.papers.fritsche2013.scenario(stay=0.6, steps=10)
+    >>> [b.id for b in tightest([lb.bcrb(scenario), lb.enumer(scenario), lb.los_only(scenario)])]
+    ['bcrb']
     """
     valid = [b for b in bounds if b.kind == "bound" and b.verdict.status is Status.VALID]
     if not valid:

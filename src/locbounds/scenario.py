@@ -1,6 +1,6 @@
 """A scenario: what is located, from what, with which prior knowledge."""
 
-from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -67,6 +67,14 @@ class Scenario(eqx.Module):
     ------
     InputError
         If pieces do not fit: dimensions, numbers of modes, names, steps.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> link = Link("bs1", lb.Range([0, 0]), lb.MarkovSight.stay(0.9), (lb.Gaussian(0, 150), lb.Gaussian(513, 436)))
+    >>> prior = lb.GaussianPrior([500, 500, 5, 5], np.diag([2500.0, 2500.0, 4.0, 4.0]))
+    >>> Scenario("one anchor", lb.Times.uniform(step_s=0.2, steps=100), lb.ConstantVelocity(0.5), prior, [link]).steps
+    100
     """
 
     title: str = eqx.field(static=True)
@@ -141,7 +149,7 @@ class Scenario(eqx.Module):
         fields = {name: getattr(self, name) for name in ("title", "times", "motion", "prior", "links")}
         return Scenario(**(fields | changes))
 
-    def with_times(self, time_s: Float[Array, " steps+1"]) -> "Scenario":
+    def with_times(self, time_s: Float[Array, " times"]) -> "Scenario":
         """The same scenario at other times; which steps had reports is forgotten."""
         links = [Link(a.name, a.measurement, a.sight, a.noises) for a in self.links]
         return self.replace(times=Times(time_s), links=links)
@@ -152,7 +160,7 @@ class Scenario(eqx.Module):
         links = [Link(a.name, a.measurement, a.sight, a.noises, reports[:, m]) for m, a in enumerate(self.links)]
         return self.replace(links=links)
 
-    def with_known_sight(self, modes: Sequence) -> "Scenario":
+    def with_known_sight(self, modes: Any) -> "Scenario":
         """The same scenario with a known sight schedule, [steps, links] or [steps] for all links alike."""
         modes = np.asarray(modes)
         modes = np.broadcast_to(modes[:, None] if modes.ndim == 1 else modes, (len(modes), len(self.links)))

@@ -27,7 +27,7 @@ class Times(eqx.Module):
     [0.0, 0.2, 0.4, 0.6]
     """
 
-    time_s: Float[Array, " steps+1"] = eqx.field(converter=float64)
+    time_s: Float[Array, " times"] = eqx.field(converter=float64)
 
     def __check_init__(self):
         if self.time_s.ndim != 1 or len(self.time_s) < 2:

@@ -16,7 +16,7 @@ from locbounds.errors import RefusedError
 from locbounds.precision import double_precision
 from locbounds.result import Result
 from locbounds.scenario import Scenario
-from locbounds.simulate import draw_noise, draw_sight, draw_states
+from locbounds.simulation import draw_noise, draw_sight, draw_states
 
 DRAWS = 16  # samples per group and block: scores of all horizons are kept for one block at a time
 MAX_MODES = 1024
@@ -68,14 +68,14 @@ def _scores(scenario, seed, block, *, samples) -> Float[Array, "samples horizons
             log_l = log_density(x, z, reported)
             gradient = jax.jacfwd(log_density)(x, z, reported)
             l = jnp.exp(log_l - log_l.max())
-            f = l * (T.T @ f)
+            f = l * (f @ T)
             D = l[:, None, None] * jnp.einsum("ij,inx->jnx", T, D)
             D = D.at[:, k].add(f[:, None] * gradient)
             total = f.sum()
             f, D = f / total, D / total
             return (f, D), D.sum(0)
 
-        first = (start, jnp.zeros((len(start), *x.shape)))
+        first = (jnp.asarray(start), jnp.zeros((len(start), *x.shape)))
         return jax.lax.scan(step, first, (jnp.arange(len(x)), x, z, transitions, reports))[1]
 
     return jax.vmap(one)(x, z)
@@ -140,7 +140,9 @@ def bcrb_algorithm1(scenario: Scenario, *, samples: int = 2048, seed: int = 0) -
     seed_key = np.uint32(check_seed(seed))
     modes = int(np.prod([len(link.noises) for link in scenario.links]))
     if modes > MAX_MODES:
-        raise RefusedError(f"Algorithm 1 would enumerate {modes} joint modes", "Use locbounds.bcrb, which adds links up")
+        raise RefusedError(
+            f"Algorithm 1 would enumerate {modes} joint modes", "Use locbounds.bcrb, which adds links up"
+        )
     matrices = [np.asarray(scenario.prior.covariance), *np.asarray(scenario.process_noise)]
     if any(np.linalg.matrix_rank(a, hermitian=True) < len(a) for a in matrices):
         raise RefusedError(
@@ -153,16 +155,16 @@ def bcrb_algorithm1(scenario: Scenario, *, samples: int = 2048, seed: int = 0) -
     def scores(block: int) -> Array:
         return _scores(scenario, seed_key, np.uint32(block), samples=count)
 
-    J_z = sum((_products(scores(b)) for b in range(1, blocks)), start=_products(scores(0))) / blocks
+    J_z = jnp.stack([_products(scores(b)) for b in range(blocks)]).mean(0)
     columns = jnp.stack([_last_columns(scenario, J_z[k - 1], k) for k in range(1, scenario.steps + 1)])
     n = scenario.motion.state_size
     K = scenario.steps
     index = np.array(scenario.motion.position_index)
     V = columns.reshape(K, K + 1, n, n)[:, 1:][..., index]  # [horizons, steps, state, space]
-    replicates = 0.0
+    replicates = jnp.zeros((GROUPS, K))
     for b in range(blocks):  # d tr = -tr(V' dJ V): a second pass projects every sample's score on V
         projected = jnp.einsum("skix,kixa->ska", scores(b), V)
-        replicates += -jnp.sum(projected**2, -1).reshape(GROUPS, DRAWS, K).mean(1) / blocks
+        replicates -= jnp.sum(projected**2, -1).reshape(GROUPS, DRAWS, K).mean(1) / blocks
     replicates = replicates - replicates.mean(0)
     k = np.arange(1, K + 1)
     covariance = columns.reshape(K, K + 1, n, n)[np.arange(K), k]

@@ -40,7 +40,9 @@ def _distinct(processes: list[NoiseProcess]) -> list[int]:
 
 
 @partial(jax.jit, static_argnames=("groups", "window"))
-def _geometry(scenario, expectation, seed, block, *, groups, window) -> Float[Array, "links groups steps w space w space"]:
+def _geometry(
+    scenario, expectation, seed, block, *, groups, window
+) -> Float[Array, "links groups steps w space w space"]:
     """Group means of ``grad h(x_n) grad h(x_n')^T`` over the window at every step."""
     paths = groups * TRACKS if expectation.random else 1
     u = directions(scenario, expectation, block_key(seed, Stream.TRACKS, block), paths)
@@ -231,6 +233,4 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
         break
     how = f"noise and geometry separated, Louis' identity, window of {size} steps"
     diagnostics = {"truncation": np.float64(truncation), "window": np.int64(size)}
-    return bound_result(
-        id, scenario, estimate, verdict, expectation, seed, done * groups * PATHS, how, diagnostics
-    )
+    return bound_result(id, scenario, estimate, verdict, expectation, seed, done * groups * PATHS, how, diagnostics)

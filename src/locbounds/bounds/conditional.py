@@ -21,7 +21,7 @@ from locbounds.precision import double_precision, traced
 from locbounds.quadrature import deviations
 from locbounds.result import Result
 from locbounds.scenario import Scenario
-from locbounds.simulate import draw_sight
+from locbounds.simulation import draw_sight
 
 SCHEDULES = 64  # sight schedules per group and block
 TRACKS = 64  # tracks per group and block
@@ -29,7 +29,7 @@ TRACKS = 64  # tracks per group and block
 
 def conditional_recursion(
     scenario: Scenario, information: Float[Array, "steps space space"]
-) -> Float[Array, "steps+1 state state"]:
+) -> Float[Array, "times state state"]:
     """Bound at every step when the measurement of step k adds this information about the position at step k.
 
     Tichavský 1998 for linear Gaussian motion, in covariance form: Q and the prior may be singular.

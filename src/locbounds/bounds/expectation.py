@@ -16,14 +16,21 @@ from locbounds.axes import Array, Float
 from locbounds.errors import InputError
 from locbounds.precision import float64, traced
 from locbounds.scenario import Scenario
-from locbounds.simulate import draw_states
+from locbounds.simulation import draw_states
 
 
 class Expectation(eqx.Module):
     """Where the gradients of the measurements are taken."""
 
-    random: eqx.AbstractClassVar[bool]
-    label: eqx.AbstractVar[str]
+    @property
+    @abstractmethod
+    def random(self) -> bool:
+        """Whether positions are drawn."""
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """What the number is conditional on; empty for a Bayesian bound."""
 
     @abstractmethod
     def positions(self, scenario: Scenario, key: Array, paths: int) -> Float[Array, "paths steps space"]:
@@ -43,7 +50,9 @@ class Prior(Expectation):
     True
     """
 
-    random = True
+    @property
+    def random(self) -> bool:
+        return True
 
     @property
     def label(self) -> str:
@@ -78,15 +87,26 @@ class AlongTrack(Expectation):
     'a walk'
     """
 
-    random = False
-    track: Float[Array, "steps+1 space"] = eqx.field(converter=float64)
-    label: str = eqx.field(static=True, default="one given track")
+    track: Float[Array, "times space"] = eqx.field(converter=float64)
+    name: str = eqx.field(static=True)
+
+    def __init__(self, track, label: str = "one given track"):
+        self.track = track
+        self.name = label
 
     def __check_init__(self):
         if self.track.ndim != 2:
             raise InputError(f"the track has shape {self.track.shape}", "Give [steps+1, space] positions in metres")
         if not traced(self.track) and not np.all(np.isfinite(self.track)):
             raise InputError("the track holds numbers that are not finite", "Give every position at steps 0..K")
+
+    @property
+    def random(self) -> bool:
+        return False
+
+    @property
+    def label(self) -> str:
+        return self.name
 
     def positions(self, scenario: Scenario, key: Array, paths: int) -> Float[Array, "paths steps space"]:
         return jnp.asarray(self.track)[None, 1:]

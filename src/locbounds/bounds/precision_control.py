@@ -19,9 +19,9 @@ Progress = Callable[[int, float, float], None]
 class Estimate(NamedTuple):
     """What one evaluation of the blocks so far yields."""
 
-    covariance: Float[Array, "steps+1 state state"]
-    position_mse: Float[Array, " steps+1"]
-    replicates: Float[Array, "groups steps+1"]
+    covariance: Float[Array, "times state state"]
+    position_mse: Float[Array, " times"]
+    replicates: Float[Array, "groups times"]
 
 
 def check_rtol(rtol: float | None, samples: int | None) -> float:

@@ -17,7 +17,7 @@ from locbounds.scenario import Scenario
 
 def covariance_recursion(
     scenario: Scenario, increments: Float[Array, "steps window space window space"]
-) -> Float[Array, "steps+1 state state"]:
+) -> Float[Array, "times state state"]:
     """Bound on the mean square error matrix at steps 0..K.
 
     Parameters
@@ -32,7 +32,7 @@ def covariance_recursion(
     Window covariance S of [x_k, position at age 1, ..., position at age W-1]; predict ``S <- T S T' + Q``, update
     ``S <- S - S D (I + S_pp D)^-1 ...`` with the information increment D on the positions.
     """
-    steps, window, d = increments.shape[:3]
+    window, d = increments.shape[1:3]
     n = scenario.motion.state_size
     position = np.array(scenario.motion.position_index)
     size = n + d * (window - 1)

@@ -27,7 +27,7 @@ from locbounds.axes import Array, Bool, Float
 from locbounds.blocks import Stream, block_key
 from locbounds.noise import Noise
 from locbounds.scenario import Link, Scenario
-from locbounds.simulate import draw_noise, draw_sight
+from locbounds.simulation import draw_noise, draw_sight
 
 
 class NoiseProcess(NamedTuple):

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float, ndarray
+from locbounds.axes import Array, Float
 
 RELATIVE_ROUNDING = 1e-10  # eigenvalues above minus this fraction of the largest count as rounding, not as negative
 
@@ -17,7 +17,7 @@ def symmetrize(a: Float[Array, "*batch n n"]) -> Float[Array, "*batch n n"]:
     return 0.5 * (a + jnp.swapaxes(a, -1, -2))
 
 
-def is_positive_semidefinite(a: Float[ndarray, "n n"]) -> bool:
+def is_positive_semidefinite(a: Float[Array, "n n"]) -> bool:
     """Whether a matrix is symmetric and has no eigenvalue below zero, up to rounding.
 
     >>> is_positive_semidefinite(np.diag([1.0, 0.0])), is_positive_semidefinite(np.diag([1.0, -0.1]))

@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float
+from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError
 from locbounds.precision import float64, traced
 
@@ -41,7 +41,7 @@ class Range(eqx.Module):
         if self.anchor.shape not in ((2,), (3,)) or not np.all(np.isfinite(self.anchor)):
             raise InputError(f"anchor position is {self.anchor}", "Give 2 or 3 finite coordinates in metres")
 
-    def __call__(self, position: Float[Array, " space"]) -> Float[Array, ""]:
+    def __call__(self, position: Float[Array, " space"]) -> Scalar:
         square = jnp.sum((position - self.anchor) ** 2, axis=-1)
         safe = jnp.where(square > 0, square, 1.0)
         return jnp.where(square > 0, jnp.sqrt(safe), 0.0)

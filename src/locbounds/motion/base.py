@@ -4,7 +4,7 @@ from abc import abstractmethod
 
 import equinox as eqx
 
-from locbounds.axes import Array, Float
+from locbounds.axes import Array, Float, Scalar
 
 
 class Motion(eqx.Module):
@@ -24,11 +24,11 @@ class Motion(eqx.Module):
         """Indices of the position coordinates in the state."""
 
     @abstractmethod
-    def transition(self, dt: Float[Array, ""]) -> Float[Array, "state state"]:
+    def transition(self, dt: Scalar) -> Float[Array, "state state"]:
         """F for an interval of ``dt`` seconds."""
 
     @abstractmethod
-    def covariance(self, dt: Float[Array, ""]) -> Float[Array, "state state"]:
+    def covariance(self, dt: Scalar) -> Float[Array, "state state"]:
         """Q for an interval of ``dt`` seconds."""
 
     @property

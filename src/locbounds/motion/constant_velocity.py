@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float
+from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError
 from locbounds.motion.base import Motion
 from locbounds.precision import float64, traced
@@ -63,11 +63,11 @@ class ConstantVelocity(Motion):
     def position_index(self) -> tuple[int, ...]:
         return tuple(range(self.axes))
 
-    def transition(self, dt: Float[Array, ""]) -> Float[Array, "state state"]:
+    def transition(self, dt: Scalar) -> Float[Array, "state state"]:
         eye = jnp.eye(self.axes)
         return jnp.block([[eye, dt * eye], [jnp.zeros_like(eye), eye]])
 
-    def covariance(self, dt: Float[Array, ""]) -> Float[Array, "state state"]:
+    def covariance(self, dt: Scalar) -> Float[Array, "state state"]:
         q = jnp.diag(jnp.broadcast_to(jnp.asarray(self.intensity), (self.axes,)))
         pp, pv, vv = (dt**4 / 4, dt**3 / 2, dt**2) if self.discrete else (dt**3 / 3, dt**2 / 2, dt)
         return jnp.block([[pp * q, pv * q], [pv * q, vv * q]])

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from locbounds.axes import Array, Float
+from locbounds.axes import Array, Float, Scalar
 
 
 class Regularity(NamedTuple):
@@ -23,11 +23,11 @@ class Noise(eqx.Module):
     A new noise implements the abstract members below; the score comes from autodiff of the log-density.
     """
 
-    mean: eqx.AbstractVar[Float[Array, ""]]
+    mean: eqx.AbstractVar[Scalar]
 
     @property
     @abstractmethod
-    def variance(self) -> Float[Array, ""]:
+    def variance(self) -> Scalar:
         """Variance in square metres."""
 
     @abstractmethod
@@ -39,7 +39,7 @@ class Noise(eqx.Module):
         """Independent draws of the given shape."""
 
     @abstractmethod
-    def information(self) -> Float[Array, ""]:
+    def information(self) -> Scalar:
         """Intrinsic accuracy ``E[score(w)^2]`` in 1/m^2: the Fisher information about a shift."""
 
     @abstractmethod

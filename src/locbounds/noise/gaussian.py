@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float
+from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError
 from locbounds.noise.base import Noise, Regularity
 from locbounds.precision import float64, traced
@@ -32,8 +32,8 @@ class Gaussian(Noise):
     1.0
     """
 
-    mean: Float[Array, ""] = eqx.field(converter=float64)
-    std: Float[Array, ""] = eqx.field(converter=float64)
+    mean: Scalar = eqx.field(converter=float64)
+    std: Scalar = eqx.field(converter=float64)
 
     def __check_init__(self):
         if traced(self.mean, self.std):
@@ -44,7 +44,7 @@ class Gaussian(Noise):
             raise InputError(f"noise standard deviation is {self.std} m", "Give a positive number of metres")
 
     @property
-    def variance(self) -> Float[Array, ""]:
+    def variance(self) -> Scalar:
         return self.std**2
 
     def log_prob(self, w: Float[Array, "*n"]) -> Float[Array, "*n"]:
@@ -53,7 +53,7 @@ class Gaussian(Noise):
     def sample(self, key: Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
         return self.mean + self.std * jax.random.normal(key, shape)
 
-    def information(self) -> Float[Array, ""]:
+    def information(self) -> Scalar:
         return 1.0 / self.std**2
 
     def components(self) -> tuple[Float[Array, " c"], Float[Array, " c"], Float[Array, " c"]]:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import logsumexp
 
-from locbounds.axes import Array, Float
+from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError
 from locbounds.noise.base import Noise, Regularity
 from locbounds.precision import float64, traced
@@ -59,11 +59,11 @@ class GaussianMixture(Noise):
             )
 
     @property
-    def mean(self) -> Float[Array, ""]:
+    def mean(self) -> Scalar:
         return (self.weights * self.means).sum()
 
     @property
-    def variance(self) -> Float[Array, ""]:
+    def variance(self) -> Scalar:
         return (self.weights * (self.stds**2 + self.means**2)).sum() - self.mean**2
 
     def log_prob(self, w: Float[Array, "*n"]) -> Float[Array, "*n"]:
@@ -75,7 +75,7 @@ class GaussianMixture(Noise):
         c = jnp.searchsorted(jnp.cumsum(self.weights)[:-1], jax.random.uniform(pick, shape), side="right")
         return jnp.asarray(self.means)[c] + jnp.asarray(self.stds)[c] * jax.random.normal(draw, shape)
 
-    def information(self) -> Float[Array, ""]:
+    def information(self) -> Scalar:
         edges = jnp.sort((self.means[:, None] + self.stds[:, None] * _BREAKS).ravel())
         half = 0.5 * jnp.diff(edges)
         w = 0.5 * (edges[1:] + edges[:-1])[:, None] + half[:, None] * _NODES

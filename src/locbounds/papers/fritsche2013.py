@@ -1,5 +1,8 @@
-"""C. Fritsche, A. Klein, F. Gustafsson, "Bayesian Cramér-Rao Bound for Mobile Terminal Tracking in Mixed LOS/NLOS
-Environments", IEEE Wireless Communications Letters, 2013: scenario, Table I and Fig. 1."""
+"""Fritsche 2013: scenario, Table I and Fig. 1.
+
+C. Fritsche, A. Klein, F. Gustafsson, "Bayesian Cramér-Rao bound for mobile terminal tracking in mixed LOS/NLOS
+environments", IEEE Wireless Communications Letters, 2013.
+"""
 
 import numpy as np
 

@@ -1,12 +1,14 @@
 """Standard errors from groups of draws (batch means)."""
 
+from typing import Any
+
 import jax.numpy as jnp
 import numpy as np
 
 from locbounds.axes import Array, Float, ndarray
 
 
-def standard_error(deviation: Float[ndarray, "groups *n"]) -> Float[ndarray, "*n"]:
+def standard_error(deviation: Float[Array, "groups *n"]) -> Float[ndarray, "*n"] | Any:
     """Standard error of a mean of independent, equally large groups, from their deviations from it.
 
     One group carries no error information: the mean is then exact by assertion and the error zero.

@@ -1,6 +1,7 @@
 """What every sight model offers."""
 
 from abc import abstractmethod
+from typing import Any
 
 import equinox as eqx
 import numpy as np
@@ -24,7 +25,7 @@ class Sight(eqx.Module):
         """Transition matrices from step k-1 to step k for k = 1..K, given the intervals in seconds."""
 
 
-def check_probabilities(rows: ndarray, what: str) -> None:
+def check_probabilities(rows: Any, what: str) -> None:
     """Raise an InputError unless the last axis holds probabilities that sum to one."""
     if not np.all(np.isfinite(rows)) or np.any(rows < 0) or np.any(np.abs(rows.sum(-1) - 1) > SUM_TOLERANCE):
         raise InputError(

@@ -29,14 +29,20 @@ class Draws(NamedTuple):
         [runs, steps, links], 0 = LOS, 1 = NLOS.
     measurements
         [runs, steps, links] in metres, NaN where a link did not report.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> lb.simulate(lb.papers.fritsche2013.scenario(), runs=5).states.shape
+    (5, 101, 4)
     """
 
-    states: Float[Array, "runs steps+1 state"]
+    states: Float[Array, "runs times state"]
     sight: Int[Array, "runs steps links"]
     measurements: Float[Array, "runs steps links"]
 
 
-def draw_states(key: Array, scenario: Scenario, runs: int) -> Float[Array, "runs steps+1 state"]:
+def draw_states(key: Array, scenario: Scenario, runs: int) -> Float[Array, "runs times state"]:
     """Tracks from the prior and the motion model."""
     first, driving = jax.random.split(key)
     n = scenario.motion.state_size
