@@ -36,19 +36,26 @@ def law(r, outliers):
     return [(1 - eps, m, s), (eps, THETA[7], np.exp(THETA[8]))]
 
 
+STEP = [expm(generator() * (b - a)) for a, b in zip(T[:-1], T[1:], strict=True)]
+
+
+def density(r, e, outliers):
+    return sum(w * norm.pdf(e, m, s) for w, m, s in law(r, outliers)) if np.isfinite(e) else 1.0
+
+
 def brute_force(label, stationary, outliers, upto=None):
     """p(e, sight) for every sequence of sights."""
     n = len(E) if upto is None else upto
+    b = [[density(r, e, outliers) for r in (0, 1)] for e in E]
     found = {}
     for r in product((0, 1), repeat=n):
         p = start(stationary)[r[0]]
         for k in range(n):
             if k:
-                p *= expm(generator() * (T[k] - T[k - 1]))[r[k - 1], r[k]]
+                p *= STEP[k - 1][r[k - 1], r[k]]
             if label[k] not in (-1, r[k]):
                 p = 0.0
-            if np.isfinite(E[k]):
-                p *= sum(w * norm.pdf(E[k], m, s) for w, m, s in law(r[k], outliers))
+            p *= b[k][r[k]]
         found[r] = p
     return found
 
@@ -86,10 +93,12 @@ def test_likelihood_posterior_and_prediction_are_sums_over_all_sight_sequences(s
         past = brute_force(label, stationary, outliers, upto=k) if k else {(): 1.0}
         ahead = np.zeros(2)
         for r, p in past.items():
-            ahead += p * (expm(generator() * (T[k] - T[k - 1]))[r[-1]] if k else start(stationary))
+            ahead += p * (STEP[k - 1][r[-1]] if k else start(stationary))
         ahead /= ahead.sum()
-        cdf = sum(ahead[r] * w * norm.cdf(E[k], m, s) for r in (0, 1) for w, m, s in law(r, outliers))
-        assert score[k] == pytest.approx(norm.ppf(cdf), abs=1e-6)  # 1 - cdf loses digits in the check, not in ours
+        parts = [(ahead[r] * w, m, s) for r in (0, 1) for w, m, s in law(r, outliers)]
+        below, above = (sum(w * f(E[k], m, s) for w, m, s in parts) for f in (norm.cdf, norm.sf))
+        expected = norm.ppf(below) if below < above else norm.isf(above)
+        assert score[k] == pytest.approx(expected, abs=1e-8)
 
 
 def test_derivative_matches_differences():

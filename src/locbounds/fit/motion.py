@@ -132,7 +132,7 @@ def fit_psd(times_s, positions_m, *, truth_std_m: float | None = None) -> Motion
     >>> a = rng.multivariate_normal([0, 0], 0.01 * np.array([[1 / 3, 1 / 2], [1 / 2, 1]]), size=(4000, 2))
     >>> v = np.cumsum(a[..., 1], 0) - a[..., 1]
     >>> x = np.cumsum(v + a[..., 0], 0)
-    >>> round(fit_psd([np.arange(4000.0)], [x], truth_std_m=0).psd_m2_s3, 3)
+    >>> round(fit_psd([np.arange(4000.0)], [x], truth_std_m=0.0).psd_m2_s3, 3)
     0.010
     """
     pairs = [(np.asarray(t, float), np.asarray(x, float)) for t, x in zip(times_s, positions_m, strict=True)]

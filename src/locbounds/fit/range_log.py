@@ -19,7 +19,7 @@ def _frozen(value, dtype=float) -> ndarray:
 
 @dataclass(frozen=True)
 class Track:
-    """One walk or drive.
+    """One walk or drive; arrays are copied and made read-only.
 
     Attributes
     ----------
@@ -35,9 +35,9 @@ class Track:
     """
 
     name: str
-    time_s: Float[ndarray, "steps+1"]
+    time_s: Float[ndarray, " times"]
     ranges_m: Float[ndarray, "steps links"]
-    position_m: Float[ndarray, "steps+1 space"] | None = None
+    position_m: Float[ndarray, "times space"] | None = None
     sight: Int[ndarray, "steps links"] | None = None
 
     def __post_init__(self):
@@ -87,8 +87,8 @@ class RangeLog:
 
     Examples
     --------
-    >>> track = Track("walk", np.arange(3.0), [[5.0], [np.nan]], [[0, 0], [3, 0], [3, 1]])
-    >>> log = RangeLog(("a",), [[0.0, 0.0]], (track,))
+    >>> track = Track("walk", np.arange(3.0), np.array([[5.0], [np.nan]]), np.array([[0.0, 0], [3, 0], [3, 1]]))
+    >>> log = RangeLog(("a",), np.array([[0.0, 0.0]]), (track,))
     >>> log.ranges, log.errors().error_m
     (1, array([[ 2., nan]]))
     """
