@@ -18,7 +18,9 @@ TRUE = {
 def errors(seed, *, sequences=24, steps=400, irregular=True, missing=0.1, outliers=True, free_start=None, scale=1.0):
     """Times, errors and sights [sequences, steps] of the model `TRUE`."""
     rng = np.random.default_rng(seed)
-    gaps = rng.choice([0.2, 0.4, 1.5], p=[0.7, 0.25, 0.05], size=(sequences, steps)) if irregular else np.full((sequences, steps), 0.5)
+    gaps = rng.choice([0.2, 0.4, 1.5], p=[0.7, 0.25, 0.05], size=(sequences, steps))
+    if not irregular:
+        gaps[:] = 0.5
     time = np.cumsum(gaps, 1)
     sight = np.empty(time.shape, int)
     dwell = np.array([TRUE["los_dwell_s"], TRUE["nlos_dwell_s"]])

@@ -24,7 +24,7 @@ def walk(seed, *, n, psd, jitter, dim=2):
 
 
 def test_likelihood_is_the_joint_gaussian_density():
-    """Cov(x(s), x(t)) of twice integrated white noise is q (s^2 t / 2 - s^3 / 6), s <= t; a flat start by a wide one."""
+    """Cov(x(s), x(t)) of twice integrated white noise is q (s^2 t / 2 - s^3 / 6), s <= t; flat start: a wide one."""
     q, r = 0.3, 0.2
     t, x = walk(0, n=6, psd=q, jitter=r)
     low, high = np.minimum.outer(t, t), np.maximum.outer(t, t)

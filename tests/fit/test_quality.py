@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from fit.simulated import errors
 from scipy.stats import kstest, norm
 
+from fit.simulated import errors
 from locbounds.fit import RangeLog, Track, fit_quality, fit_sight_noise, quality_figure
 from locbounds.fit.quality import autocorrelation, smooth_errors
 

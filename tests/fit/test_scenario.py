@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from datasets import need
 
 import locbounds as lb
+from datasets import need
 from locbounds.errors import InputError
 from locbounds.fit import RangeLog, Track, fit_quality, fit_scenario
 from locbounds.io import read_log
@@ -16,7 +16,12 @@ ANCHORS = np.array([[0.0, 0.0], [40.0, 0.0], [0.0, 40.0]])
 
 def simulated_log(*, tracks=6, steps=250, labels=False):
     """Ranges drawn from a scenario at irregular times, with gaps."""
-    noises = (lb.GaussianMixture([0.98, 0.02], [0.2, 5.0], [0.3, 40.0]), lb.GaussianMixture([0.98, 0.02], [3.0, 5.0], [1.0, 40.0]))
+    shares = [0.98, 0.02]
+    noises = (
+        lb.GaussianMixture(shares, [0.2, 5.0], [0.3, 40.0]),
+        lb.GaussianMixture(shares, [3.0, 5.0], [1.0, 40.0]),
+    )
+    sight = lb.DwellSight(None, [8.0, 4.0])
     rng = np.random.default_rng(5)
     found = []
     for i in range(tracks):
@@ -26,12 +31,12 @@ def simulated_log(*, tracks=6, steps=250, labels=False):
             times=lb.Times(time),
             motion=lb.ConstantVelocity(0.02),
             prior=lb.GaussianPrior(np.array([20.0, 20.0, 0.3, 0.0]), np.diag([25.0, 25.0, 0.1, 0.1])),
-            links=[lb.Link(str(m), lb.Range(a), lb.DwellSight(None, [8.0, 4.0]), noises) for m, a in enumerate(ANCHORS)],
+            links=[lb.Link(str(m), lb.Range(a), sight, noises) for m, a in enumerate(ANCHORS)],
         )
         draws = lb.simulate(scenario, runs=1, seed=i)
         z = np.where(rng.random((steps, 3)) < 0.1, np.nan, np.asarray(draws.measurements[0]))
-        sight = np.asarray(draws.sight[0]) if labels else None
-        found.append(Track(f"t{i}", time + 100.0, z, np.asarray(draws.states[0])[:, :2], sight))
+        label = np.asarray(draws.sight[0]) if labels else None
+        found.append(Track(f"t{i}", time + 100.0, z, np.asarray(draws.states[0])[:, :2], label))
     return RangeLog(("0", "1", "2"), ANCHORS, tuple(found))
 
 
@@ -67,7 +72,8 @@ def test_scenario_has_the_parameters_that_made_the_log(log):
     np.testing.assert_array_equal(scenario.reports, typical.reports)
     np.testing.assert_allclose(scenario.links[2].noises[1].means, fit.law(1)[1])
     np.testing.assert_allclose(scenario.links[0].sight.dwell_s, fit.dwell_s)
-    assert {"links.los", "links.nlos", "links.sight", "links.outlier", "motion.psd_m2_s3", "prior"} <= set(fitted.comments)
+    keys = {"links.los", "links.nlos", "links.sight", "links.outlier", "motion.psd_m2_s3", "prior"}
+    assert keys <= set(fitted.comments)
     assert "4 tracks" in fitted.comments["links.los"]
     assert np.isfinite(lb.simulate(scenario, runs=2, seed=0).states).all()
 
@@ -91,10 +97,9 @@ def test_what_the_log_cannot_tell_is_named(log):
     still = replace(log, tracks=tuple(replace(t, position_m=np.full((len(t.time_s), 2), 7.0)) for t in log.tracks))
     with pytest.raises(InputError, match=r"motion\.psd_m2_s3"):
         fit_scenario(still)
-    short = replace(log, tracks=(replace(log.tracks[0], time_s=np.arange(2.0), ranges_m=np.array([[1.0, np.nan, np.nan]]),
-                                         position_m=np.zeros((2, 2)), sight=None),))
+    track = Track("short", np.arange(2.0), np.array([[1.0, np.nan, np.nan]]), np.zeros((2, 2)))
     with pytest.raises(InputError, match="there is 1 range"):
-        fit_scenario(short)
+        fit_scenario(replace(log, tracks=(track,)))
 
 
 @pytest.mark.parametrize("which, held", [(2, ["t4", "t5"]), ("1", ["t5"]), ("t0, t3", ["t0", "t3"])])

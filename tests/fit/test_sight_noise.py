@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from fit.simulated import TRUE, errors
 
+from fit.simulated import TRUE, errors
 from locbounds.errors import InputError
 from locbounds.fit import fit_sight_noise
 

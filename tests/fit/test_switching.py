@@ -1,7 +1,7 @@
 """The switching likelihood against the sum over all sight sequences and against SciPy's matrix exponential."""
 
 from functools import partial
-from itertools import product
+from itertools import pairwise, product
 
 import jax
 import jax.numpy as jnp
@@ -36,7 +36,7 @@ def law(r, outliers):
     return [(1 - eps, m, s), (eps, THETA[7], np.exp(THETA[8]))]
 
 
-STEP = [expm(generator() * (b - a)) for a, b in zip(T[:-1], T[1:], strict=True)]
+STEP = [expm(generator() * (b - a)) for a, b in pairwise(T)]
 
 
 def density(r, e, outliers):
@@ -78,7 +78,8 @@ def test_likelihood_posterior_and_prediction_are_sums_over_all_sight_sequences(s
         args = [jnp.asarray(a) for a in (THETA, T, E, label)]
         value = float(switching.log_likelihood(*args, **options))
         posterior, score = (np.asarray(a) for a in switching.smooth(*args, **options))
-        padded = [args[0], *(jnp.concatenate([a, jnp.full(3, f, a.dtype)]) for a, f in zip(args[1:], (jnp.nan, jnp.nan, -1)))]
+        filling = zip(args[1:], (jnp.nan, jnp.nan, -1), strict=True)
+        padded = [args[0], *(jnp.concatenate([a, jnp.full(3, f, a.dtype)]) for a, f in filling)]
         assert float(switching.log_likelihood(*padded, **options)) == pytest.approx(value, rel=1e-14)
     joint = brute_force(label, stationary, outliers)
     total = sum(joint.values())

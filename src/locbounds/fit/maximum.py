@@ -12,9 +12,9 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from locbounds.axes import Bool, Float, Int, ndarray
 from scipy.optimize import minimize
 
+from locbounds.axes import Bool, Float, Int, ndarray
 from locbounds.errors import InputError
 from locbounds.fit import switching
 
@@ -143,8 +143,8 @@ def covariances(problem: Problem, top: Maximum, inner: Bool[ndarray, "10"], data
     """Covariance of the parameters from the observed information, and robust to dependence within groups.
 
     The second is ``H^-1 (sum_g s_g s_g^T) H^-1`` with the score ``s_g`` of a group (White 1982; Liang and Zeger 1986),
-    times ``G / (G - 1)``: it holds for wrong models too.  Parameters that are not ``inner`` (fixed, or at a limit) get zero.
-    H is differenced from the exact derivative.
+    times ``G / (G - 1)``: it holds for wrong models too.  Parameters that are not ``inner`` (fixed, or at a limit) get
+    zero.  H is differenced from the exact derivative.
     """
     kernel = _value_and_score(problem.stationary, problem.outliers)
     arrays = tuple(jnp.asarray(d) for d in data)

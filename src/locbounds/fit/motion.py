@@ -18,9 +18,9 @@ from functools import cache
 import jax
 import jax.numpy as jnp
 import numpy as np
-from locbounds.axes import Array, Float, ndarray
 from scipy.optimize import minimize
 
+from locbounds.axes import Array, Float, ndarray
 from locbounds.errors import InputError
 from locbounds.precision import double_precision
 
@@ -59,7 +59,7 @@ class MotionFit:
 
 
 def _log_likelihood(theta: Float[Array, "2"], t: Float[Array, "n"], x: Float[Array, "n space"]) -> Float[Array, ""]:
-    """log p(x_2.. | x_0, x_1) of positions at times t, theta = log (q, r^2); NaN times at the end are padding."""
+    """Log density of positions x_2.. at times t given x_0, x_1; theta = log (q, r^2); NaN times are padding."""
     q, r2 = jnp.exp(theta)
     dt = jnp.diff(t)
     ok = jnp.isfinite(dt)
@@ -146,9 +146,7 @@ def fit_psd(times_s, positions_m, *, truth_std_m: float | None = None) -> Motion
     t, x, bend, span = _pad(pairs)
     moment = float((bend**2).sum() / x.shape[-1] / span.sum())  # mean squared change of velocity per second, per axis
     if not moment > 0:
-        raise InputError(
-            "the true velocity never changes: motion.psd_m2_s3 cannot be estimated", "Give a value for it"
-        )
+        raise InputError("the true velocity never changes: motion.psd_m2_s3 cannot be estimated", "Give a value for it")
     arrays, kernel = (jnp.asarray(t), jnp.asarray(x)), _kernel()
 
     def at(theta):

@@ -240,15 +240,13 @@ def fit_quality(
 
 
 def _statement(first: float, time: float) -> str:
+    at = f"(autocorrelation {first:.2f} at one step"
     if first < WHITE:
-        return (
-            f"The errors left by the fit are nearly white (autocorrelation {first:.2f} at one step), as the bound assumes."
-        )
+        return f"The errors left by the fit are nearly white {at}), as the bound assumes."
     return (
-        f"The errors left by the fit are not white (autocorrelation {first:.2f} at one step; about {time:.0f} successive "
-        "ranges of a link tell as much as one independent range), while the bound takes every range as new information: "
-        f"it is optimistic, and the accuracy possible with such ranges is worse, for a slow mobile by up to about "
-        f"{np.sqrt(time):.1f} times."
+        f"The errors left by the fit are not white {at}; about {time:.0f} successive ranges of a link tell as much as one "
+        "independent range), while the bound takes every range as new information: it is optimistic, and the accuracy "
+        f"possible with such ranges is worse, for a slow mobile by up to about {np.sqrt(time):.1f} times."
     )
 
 

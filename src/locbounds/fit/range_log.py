@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from locbounds.axes import Bool, Float, Int, ndarray
 
+from locbounds.axes import Bool, Float, Int, ndarray
 from locbounds.errors import InputError
 
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from locbounds.axes import Float, ndarray
 
+from locbounds.axes import Float, ndarray
 from locbounds.errors import InputError
 from locbounds.fit import maximum
 from locbounds.fit.maximum import Maximum, Problem, Sequences, Units
@@ -317,7 +317,7 @@ def _notes(problem: Problem, theta, x: dict[str, float], own: Units, *, labelled
     wide = maximum.WIDE_STD
     if problem.free[wide] and theta[wide] < problem.lower[wide] + 1e-3:
         notes.append(
-            f"The outlier deviation is at its lower limit, {x['outlier_std_m']:.3g} m: the errors have a longer tail than "
-            f"two Gaussians, and {x['outlier_share']:.2%} of the ranges are taken as outliers."
+            f"The outlier deviation is at its lower limit, {x['outlier_std_m']:.3g} m: the errors have a longer tail "
+            f"than two Gaussians, and {x['outlier_share']:.2%} of the ranges are taken as outliers."
         )
     return tuple(notes)

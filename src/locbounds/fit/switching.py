@@ -21,6 +21,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 from jax.scipy.special import log_ndtr
+
 from locbounds.axes import Array, Float, Int
 
 NAMES = (
@@ -45,7 +46,7 @@ _HALF_LOG_2PI = 0.9189385332046727
 def log_transition(
     log_a: Float[Array, ""], log_b: Float[Array, ""], dt: Float[Array, "*steps"]
 ) -> Float[Array, "*steps 2 2"]:
-    """log expm(G dt) in closed form; ``[..., i, j] = log Pr(next = j | now = i)``, rows of the exponential sum to one.
+    """Logarithm of expm(G dt) in closed form; ``[..., i, j] = log Pr(next = j | now = i)``, rows sum to one.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def log_transition(
 
 
 def log_start(theta: Float[Array, "10"], *, stationary: bool) -> Float[Array, "2"]:
-    """log law of the sight at the first time: the chain's stationary law, or the free parameter of ``theta``."""
+    """Logarithm of the law of the sight at the first time: stationary, or from the parameter ``theta[9]``."""
     if stationary:
         log_sum = jnp.logaddexp(theta[4], theta[5])
         return jnp.stack([theta[5] - log_sum, theta[4] - log_sum])
@@ -79,7 +80,7 @@ def _log_normal(e, mean, log_std):
 def log_emission(
     theta: Float[Array, "10"], e: Float[Array, "steps"], label: Int[Array, "steps"], *, outliers: bool
 ) -> Float[Array, "steps 2"]:
-    """log p(e_n | r) for both sights; zero where ``e`` is NaN; a label (0 or 1; -1 = unknown) rules out the other sight."""
+    """Log density of e_n in both sights; zero where ``e`` is NaN; a label (0, 1; -1 unknown) rules out the other."""
     there = jnp.isfinite(e)
     e = jnp.where(there, e, theta[0])
     b = jnp.stack([_log_normal(e, theta[0], theta[1]), _log_normal(e, theta[2], theta[3])], -1)
@@ -128,7 +129,7 @@ def log_likelihood(
     stationary: bool,
     outliers: bool,
 ) -> Float[Array, ""]:
-    """log p(e_1..e_n) of one sequence.
+    """Log density of all errors of one sequence.
 
     Parameters
     ----------

@@ -49,6 +49,9 @@ class CsvTable:
                 header = file.readline()
                 separator = max(",;\t", key=header.count)
                 names = [name.strip().strip('"') for name in header.rstrip("\r\n").split(separator)]
+                twice = [name for name in names if names.count(name) > 1]
+                if twice:
+                    raise InputError(f"{self.path.name} has two columns {twice[0]}", "Give every column its own name")
                 # Blank lines are kept while reading, so that the row index tells the line in the file.
                 frame = pd.read_csv(
                     file, sep=separator, names=names, dtype=str, skip_blank_lines=False, keep_default_na=False,
@@ -57,15 +60,12 @@ class CsvTable:
         except FileNotFoundError:
             raise InputError(f"the {what} file {self.path} does not exist", "Check the path") from None
         except pd.errors.EmptyDataError:
-            frame, names = pd.DataFrame(), []
+            frame = pd.DataFrame()
         except (OSError, EOFError, UnicodeDecodeError, pd.errors.ParserError) as error:
             raise InputError(
                 f"the {what} file {self.path} cannot be read: {' '.join(str(error).split())}",
                 "Give a text file of comma-separated values in UTF-8 (or such a file compressed as .gz)",
             ) from None
-        twice = [name for name in names if names.count(name) > 1]
-        if twice:
-            raise InputError(f"{self.path.name} has two columns {twice[0]}", "Give every column its own name")
         self.frame = frame.dropna(how="all")
         if self.frame.empty:
             raise InputError(
@@ -83,7 +83,7 @@ class CsvTable:
     def __len__(self) -> int:
         return len(self.frame)
 
-    def line(self, row: int) -> int:
+    def line(self, row: int | np.integer) -> int:
         """Line in the file of the row at a position of what is selected; the header is line 1."""
         return int(self.frame.index[row]) + 2
 

@@ -243,8 +243,8 @@ def _note_degrees(table: CsvTable, columns: tuple[str, str], places: Float[ndarr
     long = all((table.frame[c].astype(str).str.partition(".")[2].str.len() >= 5).mean() > 0.5 for c in columns)
     if small and long and np.abs(x).max() <= 180 and np.abs(y).max() <= 180:
         notes.append(
-            f"Positions in {table.path.name} differ by less than {DEGREES_SPREAD} and have many decimals: are they degrees? "
-            "Metres are expected."
+            f"Positions in {table.path.name} differ by less than {DEGREES_SPREAD} and have many decimals: "
+            "are they degrees? Metres are expected."
         )
 
 
