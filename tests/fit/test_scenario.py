@@ -5,11 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import locbounds as lb
 from datasets import need
 from locbounds.errors import InputError
 from locbounds.fit import RangeLog, Track, fit_quality, fit_scenario
 from locbounds.io import read_log
+from locbounds.measurement import Range
+from locbounds.motion import ConstantVelocity
+from locbounds.noise import GaussianMixture
+from locbounds.priors import GaussianPrior
+from locbounds.scenario import Link, Scenario
+from locbounds.sight import DwellSight
+from locbounds.simulation import simulate
+from locbounds.times import Times
 
 ANCHORS = np.array([[0.0, 0.0], [40.0, 0.0], [0.0, 40.0]])
 
@@ -18,22 +25,22 @@ def simulated_log(*, tracks=6, steps=250, labels=False):
     """Ranges drawn from a scenario at irregular times, with gaps."""
     shares = [0.98, 0.02]
     noises = (
-        lb.GaussianMixture(shares, [0.2, 5.0], [0.3, 40.0]),
-        lb.GaussianMixture(shares, [3.0, 5.0], [1.0, 40.0]),
+        GaussianMixture(shares, [0.2, 5.0], [0.3, 40.0]),
+        GaussianMixture(shares, [3.0, 5.0], [1.0, 40.0]),
     )
-    sight = lb.DwellSight(None, [8.0, 4.0])
+    sight = DwellSight(None, [8.0, 4.0])
     rng = np.random.default_rng(5)
     found = []
     for i in range(tracks):
         time = np.r_[0, rng.choice([0.3, 0.5, 2.0], size=steps, p=[0.6, 0.35, 0.05]).cumsum()]
-        scenario = lb.Scenario(
+        scenario = Scenario(
             title="log",
-            times=lb.Times(time),
-            motion=lb.ConstantVelocity(0.02),
-            prior=lb.GaussianPrior(np.array([20.0, 20.0, 0.3, 0.0]), np.diag([25.0, 25.0, 0.1, 0.1])),
-            links=[lb.Link(str(m), lb.Range(a), sight, noises) for m, a in enumerate(ANCHORS)],
+            times=Times(time),
+            motion=ConstantVelocity(0.02),
+            prior=GaussianPrior(np.array([20.0, 20.0, 0.3, 0.0]), np.diag([25.0, 25.0, 0.1, 0.1])),
+            links=[Link(str(m), Range(a), sight, noises) for m, a in enumerate(ANCHORS)],
         )
-        draws = lb.simulate(scenario, runs=1, seed=i)
+        draws = simulate(scenario, runs=1, seed=i)
         z = np.where(rng.random((steps, 3)) < 0.1, np.nan, np.asarray(draws.measurements[0]))
         label = np.asarray(draws.sight[0]) if labels else None
         found.append(Track(f"t{i}", time + 100.0, z, np.asarray(draws.states[0])[:, :2], label))
@@ -70,12 +77,15 @@ def test_scenario_has_the_parameters_that_made_the_log(log):
     typical = next(t for t in held.tracks if t.name == fitted.layout)
     np.testing.assert_allclose(scenario.times.time_s, typical.time_s - 100.0)
     np.testing.assert_array_equal(scenario.reports, typical.reports)
-    np.testing.assert_allclose(scenario.links[2].noises[1].means, fit.law(1)[1])
-    np.testing.assert_allclose(scenario.links[0].sight.dwell_s, fit.dwell_s)
+    noise, sight = scenario.links[2].noises[1], scenario.links[0].sight
+    assert isinstance(noise, GaussianMixture)
+    assert isinstance(sight, DwellSight)
+    np.testing.assert_allclose(noise.means, fit.law(1)[1])
+    np.testing.assert_allclose(sight.dwell_s, fit.dwell_s)
     keys = {"links.los", "links.nlos", "links.sight", "links.outlier", "motion.psd_m2_s3", "prior"}
     assert keys <= set(fitted.comments)
     assert "4 tracks" in fitted.comments["links.los"]
-    assert np.isfinite(lb.simulate(scenario, runs=2, seed=0).states).all()
+    assert np.isfinite(simulate(scenario, runs=2, seed=0).states).all()
 
 
 def test_each_anchor_its_own(log):

@@ -94,7 +94,7 @@ def test_likelihood_posterior_and_prediction_are_sums_over_all_sight_sequences(s
         past = brute_force(label, stationary, outliers, upto=k) if k else {(): 1.0}
         ahead = np.zeros(2)
         for r, p in past.items():
-            ahead += p * (STEP[k - 1][r[-1]] if k else start(stationary))
+            ahead += p * (STEP[k - 1][r[k - 1]] if k else start(stationary))
         ahead /= ahead.sum()
         parts = [(ahead[r] * w, m, s) for r in (0, 1) for w, m, s in law(r, outliers)]
         below, above = (sum(w * f(E[k], m, s) for w, m, s in parts) for f in (norm.cdf, norm.sf))

@@ -244,9 +244,9 @@ def _statement(first: float, time: float) -> str:
     if first < WHITE:
         return f"The errors left by the fit are nearly white {at}), as the bound assumes."
     return (
-        f"The errors left by the fit are not white {at}; about {time:.0f} successive ranges of a link tell as much as one "
-        "independent range), while the bound takes every range as new information: it is optimistic, and the accuracy "
-        f"possible with such ranges is worse, for a slow mobile by up to about {np.sqrt(time):.1f} times."
+        f"The errors left by the fit are not white {at}; about {time:.0f} successive ranges of a link tell as much as "
+        "one independent range), while the bound takes every range as new information: it is optimistic, and the "
+        f"accuracy possible with such ranges is worse, for a slow mobile by up to about {np.sqrt(time):.1f} times."
     )
 
 

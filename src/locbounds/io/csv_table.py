@@ -7,14 +7,17 @@ import gzip
 import re
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from locbounds.axes import Float, ndarray
+from locbounds.axes import Float, Int, ndarray
 from locbounds.errors import InputError
 
 _ANGLE = re.compile(r"^(lat|latitude|lon|long|lng|longitude)([_ .(\[]|$)|(^|[_ ])deg(rees?)?$", re.IGNORECASE)
+
+_WHOLE = re.compile(r"^(-?\d+)\.0+$")
 
 
 def is_angle(column: str) -> bool:
@@ -53,7 +56,7 @@ class CsvTable:
                 if twice:
                     raise InputError(f"{self.path.name} has two columns {twice[0]}", "Give every column its own name")
                 # Blank lines are kept while reading, so that the row index tells the line in the file.
-                frame = pd.read_csv(
+                frame: Any = pd.read_csv(
                     file, sep=separator, names=names, dtype=str, skip_blank_lines=False, keep_default_na=False,
                     na_values=[""], skipinitialspace=True, index_col=False,
                 )  # fmt: skip
@@ -66,8 +69,10 @@ class CsvTable:
                 f"the {what} file {self.path} cannot be read: {' '.join(str(error).split())}",
                 "Give a text file of comma-separated values in UTF-8 (or such a file compressed as .gz)",
             ) from None
-        self.frame = frame.dropna(how="all")
-        if self.frame.empty:
+        frame = frame.dropna(how="all")
+        self._cells: dict[str, ndarray] = {str(name): frame[name].to_numpy(dtype=object) for name in frame.columns}
+        self._lines = np.asarray(frame.index, int) + 2
+        if not len(self):
             raise InputError(
                 f"the {what} file {self.path.name} has no rows", "Give a header line and a line for every value"
             )
@@ -75,17 +80,18 @@ class CsvTable:
     @property
     def names(self) -> list[str]:
         """Column names."""
-        return [str(name) for name in self.frame.columns]
+        return list(self._cells)
 
     def __contains__(self, column: str) -> bool:
-        return column in self.frame.columns
+        return column in self._cells
 
     def __len__(self) -> int:
-        return len(self.frame)
+        return len(self._lines)
 
-    def line(self, row: int | np.integer) -> int:
-        """Line in the file of the row at a position of what is selected; the header is line 1."""
-        return int(self.frame.index[row]) + 2
+    @property
+    def lines(self) -> Int[ndarray, " rows"]:
+        """Line in the file of every row that is selected; the header is line 1."""
+        return self._lines
 
     def need(self, column: str, option: str) -> None:
         """Raise an InputError with the nearest name unless there is a column that is not in degrees."""
@@ -111,30 +117,26 @@ class CsvTable:
         keep = values == value
         if not keep.any():
             known = list(dict.fromkeys(values.tolist()))
-            more = ", ..." if len(known) > 8 else ""
             raise InputError(
                 f"{self.path.name} has no row with {column} = {value}",
-                f"It has {', '.join(map(str, known[:8]))}{more}",
+                f"It has {', '.join(known[:8])}{', ...' if len(known) > 8 else ''}",
             )
-        self.frame = self.frame[keep]
+        self._cells = {name: cells[keep] for name, cells in self._cells.items()}
+        self._lines = self._lines[keep]
 
-    def keep(self, rows) -> None:
-        """Keep the rows of a mask."""
-        self.frame = self.frame[np.asarray(rows, bool)]
+    def text(self, column: str, *, empty: bool = False) -> ndarray:
+        """A column as text; names such as 3.0 lose their zeros, so that they match 3 in another file.
 
-    def text(self, column: str) -> ndarray:
-        """A column as text; names such as 3.0 lose their zeros, so that they match 3 in another file."""
-        values = self.frame[column]
-        missing = np.flatnonzero(values.isna())
-        if missing.size:
+        With ``empty``, cells may be empty; otherwise an InputError names the first line where one is.
+        """
+        cells = self._cells[column]
+        missing = np.flatnonzero(pd.isna(cells))
+        if missing.size and not empty:
             raise InputError(
-                f"line {self.line(missing[0])} of {self.path.name} has no {column}", "Fill it in or delete the line"
+                f"line {self.lines[missing[0]]} of {self.path.name} has no {column}", "Fill it in or delete the line"
             )
-        return values.str.strip().str.replace(r"^(-?\d+)\.0+$", r"\1", regex=True).to_numpy(dtype=object)
-
-    def optional_text(self, column: str) -> ndarray:
-        """A column as text; empty cells are empty strings."""
-        return self.frame[column].fillna("").str.strip().to_numpy(dtype=object)
+        unique: dict[Any, str] = {c: "" if pd.isna(c) else _WHOLE.sub(r"\1", c.strip()) for c in set(cells.tolist())}
+        return np.array([unique[c] for c in cells], dtype=object)
 
     def numbers(self, column: str) -> Float[ndarray, " rows"]:
         """A column as finite numbers.
@@ -144,18 +146,23 @@ class CsvTable:
         InputError
             Naming line, column and text of the first cell that is none.
         """
-        values = pd.to_numeric(self.frame[column], errors="coerce").to_numpy(dtype=float)
+        cells: Any = self._cells[column]
+        values = np.asarray(pd.to_numeric(cells, errors="coerce"), dtype=float)
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
-            cell = self.frame[column].iloc[bad[0]]
+            cell = cells[bad[0]]
             shown = "empty" if pd.isna(cell) else f'"{cell}"'
             more = f" (and {bad.size - 1:,} more)" if bad.size > 1 else ""
             raise InputError(
-                f"line {self.line(bad[0])} of {self.path.name}, column {column}, is {shown}{more}: not a number",
+                f"line {self.lines[bad[0]]} of {self.path.name}, column {column}, is {shown}{more}: not a number",
                 "Correct it, or delete the line: a missing range is a line that is not there",
             )
         return values
 
     def positions(self, columns: Iterable[str]) -> Float[ndarray, "rows space"]:
         """Coordinate columns as numbers."""
-        return np.stack([self.numbers(column) for column in columns], axis=1)
+        return np.column_stack([self.numbers(column) for column in columns])
+
+    def decimals(self, column: str) -> Int[ndarray, " rows"]:
+        """How many decimals the numbers of a column are written with."""
+        return np.array([len(str(cell).strip().partition(".")[2]) for cell in self._cells[column]])

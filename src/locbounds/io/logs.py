@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -151,14 +152,14 @@ def read_log(
                 f"a time offset of {time_offset_s:g} s was given, but {r.path.name} has no times",
                 f"Leave it out, or give a column {c.time} in the ranges",
             )
-    frame = pd.DataFrame(
+    frame: Any = pd.DataFrame(
         {
             "track": r.text(c.track) if c.track in r else "",
             "key": r.numbers(c.time if timed else c.step) + (time_offset_s if timed else 0.0),
             "anchor": r.text(c.anchor),
             "range": r.numbers(c.range),
             "sight": _labels(r, labels),
-            "line": [r.line(i) for i in range(len(r))],
+            "line": r.lines,
         }
     )
     true = _truth(tables.get("truth"), columns.truth, places.shape[1], steps=not timed, notes=notes)
@@ -240,7 +241,7 @@ def _anchors(table: CsvTable, c: AnchorColumns, truth: CsvTable | None, tc: Trut
 def _note_degrees(table: CsvTable, columns: tuple[str, str], places: Float[ndarray, "n space"], notes) -> None:
     x, y = places[:, 0], places[:, 1]
     small = len(x) > 1 and np.ptp(x) < DEGREES_SPREAD and np.ptp(y) < DEGREES_SPREAD and np.ptp(places[:, :2]) > 0
-    long = all((table.frame[c].astype(str).str.partition(".")[2].str.len() >= 5).mean() > 0.5 for c in columns)
+    long = all(np.mean(table.decimals(c) >= 5) > 0.5 for c in columns)
     if small and long and np.abs(x).max() <= 180 and np.abs(y).max() <= 180:
         notes.append(
             f"Positions in {table.path.name} differ by less than {DEGREES_SPREAD} and have many decimals: "
@@ -270,7 +271,7 @@ def _truth(table: CsvTable | None, c: TruthColumns, dim: int, *, steps: bool, no
             k = rows[bad[0] + 1]
             what = "repeats the time before" if t[bad[0] + 1] == t[bad[0]] else "goes back in time"
             raise InputError(
-                f"line {table.line(k)} of {table.path.name} (track {name or 1}, {c.time} = {time[k]:g}) {what}",
+                f"line {table.lines[k]} of {table.path.name} (track {name or 1}, {c.time} = {time[k]:g}) {what}",
                 "Sort each track by time and delete repeated times",
             )
         if len(np.unique(step[rows])) < len(rows):
@@ -283,18 +284,18 @@ def _labels(table: CsvTable, labels: str | None) -> ndarray:
     if labels is None:
         return np.full(len(table), -1)
     table.need(labels, "label")
-    text = table.optional_text(labels)
-    values = pd.Series(text).str.lower().map(LABELS)
-    bad = np.flatnonzero(values.isna())
+    text = table.text(labels, empty=True)
+    values = np.array([LABELS.get(cell.lower(), -2) for cell in text])
+    bad = np.flatnonzero(values == -2)
     if bad.size:
         raise InputError(
-            f'line {table.line(bad[0])} of {table.path.name}, column {labels}, says "{text[bad[0]]}"',
+            f'line {table.lines[bad[0]]} of {table.path.name}, column {labels}, says "{text[bad[0]]}"',
             "Labels are los, nlos or empty",
         )
-    return values.to_numpy(dtype=int)
+    return values
 
 
-def _check_rows(frame: pd.DataFrame, names: list[str], table: CsvTable, anchors: str | Path, timed: bool) -> None:
+def _check_rows(frame: Any, names: list[str], table: CsvTable, anchors: str | Path, timed: bool) -> None:
     unknown = frame[~frame["anchor"].isin(names)]
     if len(unknown):
         row = unknown.iloc[0]
@@ -319,7 +320,7 @@ def _check_rows(frame: pd.DataFrame, names: list[str], table: CsvTable, anchors:
             )
 
 
-def _track(name: str, rows: pd.DataFrame, names: list[str], true, timed: bool, table: CsvTable, notes) -> Track | None:
+def _track(name: str, rows: Any, names: list[str], true, timed: bool, table: CsvTable, notes) -> Track | None:
     shown = name or "1"
     if true is None and timed:
         key = np.unique(rows["key"].to_numpy())
