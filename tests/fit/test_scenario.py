@@ -8,7 +8,7 @@ import pytest
 from datasets import need
 from locbounds.errors import InputError
 from locbounds.fit import RangeLog, Track, fit_quality, fit_scenario
-from locbounds.io import read_log
+from locbounds.io.logs import read_log
 from locbounds.measurement import Range
 from locbounds.motion import ConstantVelocity
 from locbounds.noise import GaussianMixture

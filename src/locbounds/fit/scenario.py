@@ -67,7 +67,7 @@ def fit_scenario(
     Parameters
     ----------
     log : RangeLog
-        The tracks to fit, with true positions; see `locbounds.io.read_log` and `RangeLog.hold_out`.
+        The tracks to fit, with true positions; see `locbounds.io.logs.read_log` and `RangeLog.hold_out`.
     held_out : RangeLog, optional
         The scenario takes times and reports of the track of median length among these (default: among ``log``).
     per_anchor : bool

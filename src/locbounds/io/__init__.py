@@ -1,5 +1,1 @@
-"""Files: range logs in."""
-
-from locbounds.io.logs import AnchorColumns, LogColumns, RangeColumns, TruthColumns, read_log
-
-__all__ = ["AnchorColumns", "LogColumns", "RangeColumns", "TruthColumns", "read_log"]
+"""Files: scenarios, anchor tables, and writing results so that nothing is ever left half-written."""
