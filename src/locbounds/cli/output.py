@@ -86,3 +86,15 @@ def precision_progress(name: str) -> Iterator[Callable[[int, float, float], None
             bar.update(task, completed=share, reached=f"s.e. {error:.2%} of {target:.2%}, {samples:,} draws")
 
         yield report
+
+
+@contextmanager
+def status(first: str) -> Iterator[Callable[[str], None]]:
+    """What is being done now, on stderr; silent where stderr is not a terminal. Yields a function of the next text."""
+    if not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(first) as spinner:
+        yield spinner.update
