@@ -9,7 +9,10 @@ from locbounds.cli.cache import use_compile_cache
 from locbounds.cli.check import check
 from locbounds.cli.explain import explain
 from locbounds.cli.failures import Program
+from locbounds.cli.fit import fit
 from locbounds.cli.new import new
+from locbounds.cli.paper import paper
+from locbounds.cli.track import track
 
 app = typer.Typer(
     name="locbounds",
@@ -49,6 +52,9 @@ def program(
 
 app.command()(new)
 app.command()(check)
+app.command()(track)
+app.command()(fit)
+app.command()(paper)
 app.command()(explain)
 
 

@@ -100,3 +100,15 @@ def _bar(name: str) -> Iterator[Callable[[float, str], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(name, total=1.0, reached="compiling")
         yield lambda share, reached: bar.update(task, completed=share, reached=reached)
+
+
+@contextmanager
+def status(first: str) -> Iterator[Callable[[str], None]]:
+    """What is being done now, on stderr; silent where stderr is not a terminal. Yields a function of the next text."""
+    if not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status(first) as spinner:
+        yield spinner.update
