@@ -1,1 +1,1 @@
-"""What people look at: figures, tables and descriptions."""
+"""Results for people: figures, tables, files, and scenarios in words."""
