@@ -15,7 +15,7 @@ from locbounds.cli.log_options import (
     read,
 )
 from locbounds.cli.options import ForceOption, JsonOption, OutOption, ScenarioArgument, SeedOption, default_out
-from locbounds.cli.output import output_folder, precision_progress, print_json, print_table, status
+from locbounds.cli.output import count_progress, output_folder, precision_progress, print_json, print_table, status
 
 if TYPE_CHECKING:
     from locbounds.registry import Method
@@ -93,24 +93,25 @@ def _filters(model: "Scenario", ids: str | None) -> list[Any]:
 def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
     from locbounds import registry
     from locbounds.evaluation import evaluate_on, quantile
-    from locbounds.report import dataset, plot, tables
     from locbounds.result import format_with_error, tightest
     from locbounds.simulation import simulate
 
     results: list[Result] = []
-    for entry in bounds:
-        with precision_progress(entry.name) as progress:
-            results.append(registry.load(entry)(model, rtol=rtol, seed=seed, progress=progress))
+    try:
+        for entry in bounds:
+            with precision_progress(entry.name) as progress:
+                results.append(registry.load(entry)(model, rtol=rtol, seed=seed, progress=progress))
+        if filters:
+            with status(f"drawing {runs:,} tracks"):
+                draws = simulate(model, runs=runs, seed=seed)
+        for filter in filters:
+            with count_progress(filter.name) as progress:
+                results.append(evaluate_on(filter, model, draws, seed=seed, progress=progress))
+    except KeyboardInterrupt:
+        _save(results, model, folder)
+        raise
+    _save(results, model, folder)
     best = tightest(results)
-    if filters:
-        with status(f"drawing {runs:,} tracks") as say:
-            draws = simulate(model, runs=runs, seed=seed)
-            for filter in filters:
-                say(f"{filter.name}: {runs:,} tracks")
-                results.append(evaluate_on(filter, model, draws, seed=seed))
-    folder.write_text("rmse.csv", tables.csv_text(tables.RMSE_COLUMNS, tables.rmse_rows(results)))
-    folder.write("run.nc", lambda path: dataset.save(results, path))
-    folder.write("rmse.png", lambda path: plot.rmse(results, title=model.title).savefig(path, dpi=150))
 
     rows = []
     for r in results:
@@ -142,6 +143,16 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
     for warning in dict.fromkeys(w for r in results for w in r.verdict.warnings):
         typer.echo(f"warning: {warning}")
     typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")
+
+
+def _save(results, model, folder) -> None:
+    """Files of what was computed, after Ctrl-C too."""
+    from locbounds.report import dataset, plot, tables
+
+    if results:
+        folder.write_text("rmse.csv", tables.csv_text(tables.RMSE_COLUMNS, tables.rmse_rows(results)))
+        folder.write("run.nc", lambda path: dataset.save(results, path))
+        folder.write("rmse.png", lambda path: plot.rmse(results, title=model.title).savefig(path, dpi=150))
 
 
 def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) -> None:
