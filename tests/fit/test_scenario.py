@@ -80,8 +80,8 @@ def test_scenario_has_the_parameters_that_made_the_log(log):
     noise, sight = scenario.links[2].noises[1], scenario.links[0].sight
     assert isinstance(noise, GaussianMixture)
     assert isinstance(sight, DwellSight)
-    np.testing.assert_allclose(noise.means, fit.law(1)[1])
-    np.testing.assert_allclose(sight.dwell_s, fit.dwell_s)
+    np.testing.assert_allclose(noise.means, fit.law(1)[1], rtol=1e-3)  # written with four digits
+    np.testing.assert_allclose(sight.dwell_s, fit.dwell_s, rtol=1e-3)
     keys = {"links.los", "links.nlos", "links.sight", "links.outlier", "motion.psd_m2_s3", "prior"}
     assert keys <= set(fitted.comments)
     assert "4 tracks" in fitted.comments["links.los"]
@@ -125,21 +125,31 @@ def test_hold_out_refuses(log, which):
         log.hold_out(which)
 
 
+def canteen():
+    folder = need("wifi_rtt_walks")
+    return read_log(
+        folder / "ranges.csv.gz", anchors=folder / "anchors.csv", truth=folder / "truth.csv.gz", select="scene=canteen"
+    )
+
+
+def test_real_walks_have_the_errors_published_with_them():
+    """README of the data: 79,797 ranges (ours lack those of step 0), mean error 2.064 m, median 1.530 m."""
+    log = canteen()
+    assert (len(log.tracks), len(log.anchor_names), log.notes) == (16, 6, ())
+    assert 79_797 - 16 * 6 <= log.ranges < 79_797
+    errors = log.errors().error_m
+    seen = errors[np.isfinite(errors)]
+    assert np.isclose(seen.mean(), 2.064, atol=0.005)
+    assert np.isclose(np.median(seen), 1.530, atol=0.002)
+
+
+@pytest.mark.slow
 def test_real_walks_agree_with_the_two_state_fit_published_with_them():
     """README of the data: discrete-time Gaussian hidden Markov model, pooled, without outliers over 20 m.
 
     Ours is in continuous time and takes 1 % outliers, which shortens the NLOS tail: similar, not equal.
     """
-    folder = need("wifi_rtt_walks")
-    log = read_log(
-        folder / "ranges.csv.gz", anchors=folder / "anchors.csv", truth=folder / "truth.csv.gz", select="scene=canteen"
-    )
-    assert (len(log.tracks), len(log.anchor_names), log.notes) == (16, 6, ())
-    errors = log.errors().error_m
-    seen = errors[np.isfinite(errors)]
-    assert np.isclose(seen.mean(), 2.064, atol=0.01)  # README, all ranges; without those of step 0 here
-    assert np.isclose(np.median(seen), 1.530, atol=0.005)
-    fitted = fit_scenario(log)
+    fitted = fit_scenario(canteen())
     fit = next(iter(fitted.noise.values()))
     readme = {"los_mean_m": 1.232, "los_std_m": 0.673, "nlos_mean_m": 4.037, "nlos_std_m": 2.468}
     for name, value in (readme | {"los_dwell_s": 10.8, "nlos_dwell_s": 4.4}).items():

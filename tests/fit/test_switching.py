@@ -76,11 +76,12 @@ def test_likelihood_posterior_and_prediction_are_sums_over_all_sight_sequences(s
     options = {"stationary": stationary, "outliers": outliers}
     with jax.enable_x64(True):
         args = [jnp.asarray(a) for a in (THETA, T, E, label)]
-        value = float(switching.log_likelihood(*args, **options))
-        posterior, score = (np.asarray(a) for a in switching.smooth(*args, **options))
+        likelihood = jax.jit(partial(switching.log_likelihood, **options))
+        value = float(likelihood(*args))
+        posterior, score = (np.asarray(a) for a in jax.jit(partial(switching.smooth, **options))(*args))
         filling = zip(args[1:], (jnp.nan, jnp.nan, -1), strict=True)
         padded = [args[0], *(jnp.concatenate([a, jnp.full(3, f, a.dtype)]) for a, f in filling)]
-        assert float(switching.log_likelihood(*padded, **options)) == pytest.approx(value, rel=1e-14)
+        assert float(likelihood(*padded)) == pytest.approx(value, rel=1e-14)
     joint = brute_force(label, stationary, outliers)
     total = sum(joint.values())
     assert value == pytest.approx(np.log(total), abs=EXACT)
@@ -106,7 +107,7 @@ def test_derivative_matches_differences():
     with jax.enable_x64(True):
         args = [jnp.asarray(a) for a in (T, E, np.full(len(T), -1))]
         value = jax.jit(partial(switching.log_likelihood, stationary=False, outliers=True))
-        gradient = np.asarray(jax.grad(value)(jnp.asarray(THETA), *args))
+        gradient = np.asarray(jax.jit(jax.grad(value))(jnp.asarray(THETA), *args))
         for i in range(10):
             h = 1e-5 * np.eye(10)[i]
             difference = float(value(THETA + h, *args) - value(THETA - h, *args)) / 2e-5

@@ -105,7 +105,7 @@ def fit_scenario(
         intensity = float(psd_m2_s3 or 0.0)
         comments["motion.psd_m2_s3"] = "given"
     else:
-        intensity = motion.psd_m2_s3
+        intensity = float(_digits(motion.psd_m2_s3))
         spread = "" if np.isnan(motion.stderr) else f", s.e. {motion.stderr:.2g}"
         comments["motion.psd_m2_s3"] = (
             f"maximum likelihood, true positions of {_count(motion.tracks, 'track')}, {motion.steps:,} steps{spread}; "
@@ -114,7 +114,8 @@ def fit_scenario(
         notes += list(motion.notes)
     start = prior
     if isinstance(start, str):
-        start = GaussianPrior(*prior_from_tracks(times, places, where=start))
+        mean, covariance = prior_from_tracks(times, places, where=start)
+        start = GaussianPrior(_digits(mean), _digits(covariance, 8))  # a covariance needs digits to stay positive
         where = "where the tracks were, each moment alike" if prior == "area" else "where the tracks start"
         comments["prior"] = f"mean and covariance over {_count(len(log.tracks), 'track')}: {where}"
     else:
@@ -171,9 +172,21 @@ def _noise(log: RangeLog, per_anchor: bool, outliers: bool):
 def _laws(fit: SightNoiseFit) -> tuple[DwellSight, tuple[Noise, Noise]]:
     def law(sight: int) -> Noise:
         weights, means, stds = fit.law(sight)
-        return GaussianMixture(weights, means, stds) if len(weights) > 1 else Gaussian(means[0], stds[0])
+        means, stds = _digits(means), _digits(stds)
+        if len(weights) == 1:
+            return Gaussian(means[0], stds[0])
+        eps = float(_digits(weights[1]))
+        return GaussianMixture(np.array([1 - eps, eps]), means, stds)
 
-    return DwellSight(fit.start, fit.dwell_s), (law(0), law(1))
+    nlos = round(fit.start_nlos, 4)
+    return DwellSight(np.array([round(1 - nlos, 4), nlos]), _digits(np.array(fit.dwell_s))), (law(0), law(1))
+
+
+def _digits(x, digits: int = 4):
+    """Rounded to significant digits, well below any standard error, so that a scenario file stays readable."""
+    size = np.floor(np.log10(np.maximum(np.abs(x), 1e-300)))
+    scale = 10.0 ** (digits - 1 - size)
+    return np.round(np.asarray(x) * scale) / scale
 
 
 def _count(n: int, what: str) -> str:
