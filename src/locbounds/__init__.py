@@ -10,6 +10,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     submod_attrs={
         "bounds": ["AlongTrack", "Prior", "bcrb", "bcrb_algorithm1", "enumer", "known_sight", "los_only"],
         "errors": ["InputError", "LocboundsError", "PrecisionError", "RefusedError"],
+        "filters": ["Estimates", "FactorisedImmEkf", "ImmEkf", "ImmKf", "OracleEkf"],
         "measurement": ["Range"],
         "motion": ["ConstantVelocity"],
         "noise": ["Gaussian", "GaussianMixture"],
