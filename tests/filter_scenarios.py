@@ -9,7 +9,9 @@ CHAINS = ([[0.9, 0.1], [0.3, 0.7]], [[0.6, 0.4], [0.05, 0.95]], [[0.8, 0.2], [0.
 STARTS = ([0.7, 0.3], [0.2, 0.8], [0.5, 0.5])
 
 
-def awkward(dim: int, *, links: int = 3, outliers: bool = False, discrete: bool = False, steps: int = 12) -> lb.Scenario:
+def awkward(
+    dim: int, *, links: int = 3, outliers: bool = False, discrete: bool = False, steps: int = 12
+) -> lb.Scenario:
     """Asymmetric chains, noises that differ, a correlated prior; everything that a transposed matrix would show."""
     rng = np.random.default_rng(5)
     root = rng.normal(size=(2 * dim, 2 * dim)) * np.repeat([20.0, 1.0], dim)[:, None]

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-import textbook_filters as textbook
-from filter_scenarios import awkward, with_gaps
 from scipy.optimize import least_squares
 
 import locbounds as lb
+import textbook_filters as textbook
+from filter_scenarios import awkward, with_gaps
 from locbounds.filters import ImmKf
 from locbounds.filters.lowering import lower
 from locbounds.precision import double_precision
@@ -93,9 +93,7 @@ def test_a_second_start_finds_the_position_across_the_base_line():
 def test_collinear_anchors_stay_on_the_side_where_the_track_began():
     scenario = awkward(2)
     noise = lb.Gaussian(0.0, 5.0)
-    links = [
-        lb.Link(f"a{m}", lb.Range([100.0 * m, 0.0]), lb.MarkovSight.stay(0.9), (noise, noise)) for m in range(3)
-    ]
+    links = [lb.Link(f"a{m}", lb.Range([100.0 * m, 0.0]), lb.MarkovSight.stay(0.9), (noise, noise)) for m in range(3)]
     prior = lb.GaussianPrior([100.0, 80.0, 0, 0], np.diag([25.0, 25.0, 0.01, 0.01]))
     scenario = scenario.replace(prior=prior, links=links, motion=lb.ConstantVelocity(0.001))
     draws = lb.simulate(scenario, runs=50, seed=1)

@@ -2,10 +2,10 @@ import datetime
 
 import numpy as np
 import pytest
-import textbook_filters as textbook
-from filter_scenarios import awkward, with_gaps
 
 import locbounds as lb
+import textbook_filters as textbook
+from filter_scenarios import awkward, with_gaps
 from locbounds.filters import ImmEkf, OracleEkf
 from locbounds.filters.lowering import lower
 from locbounds.precision import double_precision
@@ -72,7 +72,9 @@ def test_stone_soup(paper):
         detection = Detection(StateVector(ranges - bias[sight]), measurement_model=model, timestamp=now)
         prediction = predictor.predict(state, timestamp=now)
         state = ExtendedKalmanUpdater(model).update(SingleHypothesis(prediction, detection))
-        expected.append((np.asarray(state.state_vector, float)[order, 0], np.asarray(state.covar)[np.ix_(order, order)]))
+        expected.append(
+            (np.asarray(state.state_vector, float)[order, 0], np.asarray(state.covar)[np.ix_(order, order)])
+        )
     ours = OracleEkf()(scenario, draws.measurements[:1], 0, draws.sight[:1])
     np.testing.assert_allclose(ours.mean[0, 1:], [x for x, _ in expected], atol=1e-6)
     np.testing.assert_allclose(ours.covariance[0, 1:], [P for _, P in expected], rtol=1e-6, atol=1e-6)
