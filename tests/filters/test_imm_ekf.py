@@ -21,15 +21,8 @@ def textbook_tracks(scenario, z):
     "options",
     [
         {"dim": 2},
-<<<<<<< HEAD
-        {"dim": 3},
-        {"dim": 2, "discrete": True},  # Q singular
-        {"dim": 2, "outliers": True},
-        {"dim": 3, "links": 1},
-=======
         {"dim": 2, "discrete": True},  # Q singular
         {"dim": 3, "links": 2, "outliers": True},
->>>>>>> filters
     ],
     ids=str,
 )

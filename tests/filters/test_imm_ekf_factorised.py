@@ -11,11 +11,7 @@ from locbounds.precision import double_precision
 ROUNDING = 1e-8  # metres; the same algebra in another order
 
 
-<<<<<<< HEAD
-@pytest.mark.parametrize("options", [{"dim": 2}, {"dim": 3}, {"dim": 2, "outliers": True}], ids=str)
-=======
 @pytest.mark.parametrize("options", [{"dim": 2}, {"dim": 3, "outliers": True}], ids=str)
->>>>>>> filters
 def test_linear_cost_equals_the_quadratic_textbook(options):
     scenario = awkward(**options)
     model = double_precision(lower)(scenario)
