@@ -12,7 +12,7 @@ from locbounds.blocks import Stream, block_key, check_seed
 from locbounds.errors import InputError
 from locbounds.linalg import psd_root
 from locbounds.noise import Noise
-from locbounds.precision import double_precision
+from locbounds.precision import double_precision, traced
 from locbounds.scenario import Scenario
 
 RUNS_PER_BLOCK = 1024
@@ -43,10 +43,10 @@ class Draws(NamedTuple):
 
 
 def draw_states(key: Array, scenario: Scenario, runs: int) -> Float[Array, "runs times state"]:
-    """Tracks from the prior and the motion model."""
+    """Tracks from the prior and the motion model; differentiable in both."""
     first, driving = jax.random.split(key)
     n = scenario.motion.state_size
-    x0 = scenario.prior.mean + jax.random.normal(first, (runs, n)) @ psd_root(jnp.asarray(scenario.prior.covariance)).T
+    x0 = scenario.prior.mean + jax.random.normal(first, (runs, n)) @ psd_root(jnp.asarray(scenario.prior.covariance))
     roots = psd_root(scenario.process_noise)
     v = jnp.einsum("krj,kij->kri", jax.random.normal(driving, (scenario.steps, runs, n)), roots)
 
@@ -78,8 +78,22 @@ def draw_sight(
     return jax.lax.scan(step, r0, (transitions, jax.random.uniform(rest, (len(transitions), runs))))[1]
 
 
+def likelihood_ratios(
+    sight: Int[Array, "steps runs"], start: Float[Array, " modes"], transitions: Float[Array, "steps modes modes"]
+) -> Float[Array, "steps runs"]:
+    """Ones, whose derivative with respect to the chain is that of the log-probability of the sight up to every step.
+
+    Drawing a sight has no derivative. Means over draws that are weighted with these ratios have the right one:
+    ``d E[f] = E[d f] + E[f d log p]``.
+    """
+    first = (jnp.asarray(start) @ transitions[0])[sight[0]]
+    later = jax.vmap(lambda T, now, next: T[now, next])(transitions[1:], sight[:-1], sight[1:])
+    log_p = jnp.cumsum(jnp.log(jnp.concatenate([first[None], later])), axis=0)
+    return jnp.exp(log_p - jax.lax.stop_gradient(log_p))
+
+
 def draw_noise(key: Array, noises: tuple[Noise, ...], sight: Int[Array, "*n"]) -> Float[Array, "*n"]:
-    """Noise given the sight of every sample."""
+    """Noise given the sight of every sample; differentiable in the noises."""
     keys = jax.random.split(key, len(noises))
     draws = [noise.sample(k, sight.shape) for noise, k in zip(noises, keys, strict=True)]
     w = draws[0]
@@ -128,6 +142,11 @@ def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
     InputError
         If ``runs`` is below 1.
 
+    Notes
+    -----
+    States and measurements can be differentiated with respect to prior, motion, anchors and noises, for the sight that
+    was drawn; the sight itself jumps.
+
     Examples
     --------
     >>> import locbounds as lb
@@ -140,4 +159,6 @@ def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
     blocks = [
         _draw_block(scenario, np.uint32(seed), np.uint32(b), RUNS_PER_BLOCK) for b in range(-(-runs // RUNS_PER_BLOCK))
     ]
-    return Draws(*(np.concatenate([np.asarray(part) for part in parts])[:runs] for parts in zip(*blocks, strict=True)))
+    if traced(scenario):
+        return jax.tree.map(lambda *parts: jnp.concatenate(parts)[:runs], *blocks)
+    return jax.tree.map(lambda *parts: np.concatenate([np.asarray(part) for part in parts])[:runs], *blocks)

@@ -21,7 +21,7 @@ from locbounds.precision import double_precision, traced
 from locbounds.quadrature import deviations
 from locbounds.result import Result
 from locbounds.scenario import Scenario
-from locbounds.simulation import draw_sight
+from locbounds.simulation import draw_sight, likelihood_ratios
 
 SCHEDULES = 64  # sight schedules per group and block
 TRACKS = 64  # tracks per group and block
@@ -58,21 +58,29 @@ def _geometry(scenario, expectation, seed, block, *, groups) -> Float[Array, "gr
 
 
 @partial(jax.jit, static_argnames=("groups", "los_ranges_only"))
-def _schedules(scenario, seed, block, *, groups, los_ranges_only) -> Float[Array, "groups schedules links steps"]:
-    """Information of every range about its own distance, for random sight schedules."""
-    rows = []
+def _schedules(
+    scenario, seed, block, *, groups, los_ranges_only
+) -> tuple[Float[Array, "groups schedules links steps"], Float[Array, "groups schedules steps"]]:
+    """Information of every range about its own distance, for random sight schedules, and their weights in the mean.
+
+    The weights are equal; their derivatives make those of the mean right, as drawing a schedule has none.
+    """
+    rows, ratios = [], 1.0
     for m, link in enumerate(scenario.links):
         process = noise_process(scenario, link)
         key = jax.random.fold_in(block_key(seed, Stream.SCHEDULES, block), m)
-        sight = draw_sight(key, process.start, process.transitions, groups * SCHEDULES).T
+        sight = draw_sight(key, process.start, process.transitions, groups * SCHEDULES)
+        ratios = ratios * likelihood_ratios(sight, process.start, process.transitions)
+        sight = sight.T
         info = mode_information(process)
         info = info * (jnp.arange(len(info)) == 0) if los_ranges_only else info
         rows.append((info[sight] * process.reports).reshape(groups, SCHEDULES, -1))
-    return jnp.stack(rows, 2)
+    ratios = ratios.T.reshape(groups, SCHEDULES, -1)
+    return jnp.stack(rows, 2), ratios / ratios.sum(1, keepdims=True)
 
 
 @jax.jit
-def _block(scenario, info, G, G_mean):
+def _block(scenario, info, weights, G, G_mean):
     """Group means over schedules of the covariance, the position mse, and the mse's change with the geometry."""
     index = np.array(scenario.motion.position_index)
 
@@ -86,13 +94,15 @@ def _block(scenario, info, G, G_mean):
 
     G = jnp.broadcast_to(G, (info.shape[0], *G.shape[1:]))
     P, mse, change = jax.vmap(jax.vmap(one, (0, None)), (0, 0))(info, G - G_mean)
-    return P.mean((0, 1)), mse.mean(1), change.mean(1)
+    with_prior = jnp.concatenate([weights[..., :1], weights], -1)  # step 0 is the same for every schedule
+    P = jnp.einsum("gsk,gskij->kij", with_prior, P) / len(P)
+    return P, jnp.sum(with_prior * mse, 1), jnp.sum(with_prior * change, 1)
 
 
 def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, progress, conditions=()) -> Result:
     """The common part of enumer and los-only, which differ in the information of NLOS ranges and in the verdict."""
     expectation, verdict = prepare(id, scenario, expectation, conditions)
-    target = check_rtol(rtol, samples)
+    target = check_rtol(rtol, samples, traced(scenario, expectation))
     seed_key = np.uint32(check_seed(seed))
     blocks = None if samples is None else -(-samples // (GROUPS * SCHEDULES))
 
@@ -101,8 +111,9 @@ def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, prog
         return sum(tables[1:], start=tables[0]) / count
 
     def draw(block: int, G: Array):
-        info = _schedules(scenario, seed_key, np.uint32(block), groups=GROUPS, los_ranges_only=id == "los-only")
-        return _block(scenario, info, G, G.mean(0))
+        b, los_ranges_only = np.uint32(block), id == "los-only"
+        info, weights = _schedules(scenario, seed_key, b, groups=GROUPS, los_ranges_only=los_ranges_only)
+        return _block(scenario, info, weights, G, G.mean(0))
 
     def estimate_from(tables) -> Estimate:
         P, mse, change = tables
@@ -121,7 +132,7 @@ def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, prog
         lambda block: draw(block, G),
         estimate_from,
         rtol=target,
-        blocks=1 if traced(scenario, expectation) else blocks,
+        blocks=blocks or (1 if traced(scenario, expectation) else None),
         samples_per_block=GROUPS * SCHEDULES,
         progress=progress,
     )

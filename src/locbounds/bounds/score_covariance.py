@@ -27,7 +27,7 @@ from locbounds.axes import Array, Bool, Float
 from locbounds.blocks import Stream, block_key
 from locbounds.noise import Noise
 from locbounds.scenario import Link, Scenario
-from locbounds.simulation import draw_noise, draw_sight
+from locbounds.simulation import draw_noise, draw_sight, likelihood_ratios
 
 
 class NoiseProcess(NamedTuple):
@@ -62,9 +62,16 @@ def mode_information(process: NoiseProcess) -> Float[Array, " modes"]:
     return jnp.stack([jnp.asarray(noise.information()) for noise in process.noises])
 
 
-@partial(jax.jit, static_argnames=("groups", "paths", "window"))
+@partial(jax.jit, static_argnames=("groups", "paths", "window", "differentiable"))
 def score_covariance_increments(
-    process: NoiseProcess, seed: Array, block: Array, *, groups: int, paths: int, window: int
+    process: NoiseProcess,
+    seed: Array,
+    block: Array,
+    *,
+    groups: int,
+    paths: int,
+    window: int,
+    differentiable: bool = False,
 ) -> Float[Array, "groups steps window window"]:
     """Group means of the increments ``C(., .; k) - C(., .; k-1)``, entries by age relative to the horizon k.
 
@@ -76,6 +83,8 @@ def score_covariance_increments(
         Which draws: ``groups * paths`` noise paths.
     groups, paths, window
         Groups kept apart, paths in each, ages kept.
+    differentiable
+        Weigh the paths with their likelihood ratios, so that derivatives with respect to the chain are unbiased.
 
     Notes
     -----
@@ -90,17 +99,24 @@ def score_covariance_increments(
     s = jnp.where(reported, jnp.stack([law.score(w) for law in process.noises], -1), 0.0)
     known = mode_probabilities(process) @ mode_information(process) * process.reports
 
-    def mean(x: Array) -> Array:  # over the paths of each group
-        return x.reshape(groups, paths, *x.shape[1:]).mean(1)
+    ratios = likelihood_ratios(sight, process.start, process.transitions) if differentiable else None
 
     def step(carry, inputs):
         p, A = carry  # [n, modes], [n, modes, window]: A[., r, i] = E[s at age i | w_{1:k-1}, r_{k-1} = r]
-        T, log_l, s, known = inputs
-        predicted = p @ T
-        l = jnp.exp(log_l - jnp.max(jnp.where(predicted > 0, log_l, -jnp.inf), -1, keepdims=True))
-        joint = p[:, :, None] * T * jnp.where(predicted > 0, l, 0.0)[:, None, :]
+        T, log_l, s, known, ratio = inputs
+        log_l = jnp.where(p @ T > 0, log_l, -jnp.inf)  # a mode that cannot be has no say in the scale
+        joint = p[:, :, None] * T * jnp.exp(log_l - jnp.max(log_l, -1, keepdims=True))[:, None, :]
         joint = joint / joint.sum((1, 2), keepdims=True)
         p_new, q = joint.sum(1), joint.sum(2)
+
+        weights = None  # of the paths in each group; the mean ratio is one, and dividing by it removes a common level
+        if ratio is not None:
+            ratio = ratio.reshape(groups, paths)
+            weights = ratio / ratio.sum(1, keepdims=True)
+
+        def mean(x: Array) -> Array:  # over the paths of each group
+            x = x.reshape(groups, paths, *x.shape[1:])
+            return x.mean(1) if weights is None else jnp.einsum("gn,gn...->g...", weights, x)
 
         centred = A - jnp.sum(p[:, :, None] * A, 1, keepdims=True)
         xi = jnp.sum(q[:, :, None] * centred, 1)
@@ -109,7 +125,8 @@ def score_covariance_increments(
         s_given_old = jnp.sum(joint * s[:, None, :], -1)  # E[s_k ; r_{k-1} = r | w_{1:k}]
         cross = -mean(jnp.sum(s_given_old[:, :, None] * centred, 1) - xi * a[:, None])[:, :-1]
         ages = xi[:, :-1].reshape(groups, paths, window - 1)
-        old = jnp.einsum("gni,gnj->gij", ages, ages) / paths
+        weighted = ages / paths if weights is None else ages * weights[:, :, None]
+        old = jnp.einsum("gni,gnj->gij", weighted, ages)
         top = jnp.concatenate([newest[:, None, None], cross[:, None, :]], -1)
         increment = jnp.concatenate([top, jnp.concatenate([cross[:, :, None], old], -1)], -2)
 
@@ -118,5 +135,5 @@ def score_covariance_increments(
         return (p_new, jnp.concatenate([s[:, :, None], kept], -1)), increment
 
     first = (jnp.broadcast_to(jnp.asarray(process.start), (n, modes)), jnp.zeros((n, modes, window)))
-    _, increments = jax.lax.scan(step, first, (process.transitions, log_l, s, known))
+    _, increments = jax.lax.scan(step, first, (process.transitions, log_l, s, known, ratios))
     return jnp.moveaxis(increments, 0, 1)
