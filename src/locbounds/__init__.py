@@ -10,6 +10,8 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     submod_attrs={
         "bounds": ["AlongTrack", "Prior", "bcrb", "bcrb_algorithm1", "enumer", "known_sight", "los_only"],
         "errors": ["InputError", "LocboundsError", "PrecisionError", "RefusedError"],
+        "evaluation": ["evaluate", "quantile"],
+        "io.scenario_file": ["load", "save"],
         "measurement": ["Range"],
         "motion": ["ConstantVelocity"],
         "noise": ["Gaussian", "GaussianMixture"],

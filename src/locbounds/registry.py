@@ -3,7 +3,8 @@
 Docs tables, ``locbounds explain``, verdicts and the command line's choices are all made from it.
 """
 
-from typing import NamedTuple
+import importlib
+from typing import Any, NamedTuple
 
 from locbounds.errors import InputError
 from locbounds.scenario import Scenario
@@ -172,3 +173,13 @@ def method(id: str, kind: str | None = None) -> Method:
     near = difflib.get_close_matches(id, [m.id for m in known], n=1, cutoff=0.4)
     hint = f"Did you mean {near[0]}? " if near else ""
     raise InputError(f"unknown {kind or 'method'} {id!r}", f"{hint}Known: {', '.join(m.id for m in known)}")
+
+
+def load(entry: Method) -> Any:
+    """The callable of an entry, imported now.
+
+    >>> load(method("bcrb")).__name__
+    'bcrb'
+    """
+    module, _, name = entry.function.partition(":")
+    return getattr(importlib.import_module(module), name)

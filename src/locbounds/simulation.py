@@ -59,23 +59,27 @@ def draw_states(key: Array, scenario: Scenario, runs: int) -> Float[Array, "runs
     return jnp.concatenate([x0[:, None], jnp.moveaxis(later, 0, 1)], axis=1)
 
 
-def draw_sight(
-    key: Array, start: Float[Array, " modes"], transitions: Float[Array, "steps modes modes"], runs: int
+def sight_from_uniforms(
+    start: Float[Array, " modes"], transitions: Float[Array, "steps modes modes"], u: Float[Array, "times runs"]
 ) -> Int[Array, "steps runs"]:
-    """Sight of one link at steps 1..K; the chain starts at step 0."""
-    first, rest = jax.random.split(key)
+    """Sight of one link at steps 1..K from uniform numbers at steps 0..K, by inverse distribution functions."""
 
     def pick(law, u):  # inverse distribution function; law [..., modes]
         return jnp.sum(u[..., None] >= jnp.cumsum(law, -1)[..., :-1], -1)
-
-    r0 = pick(jnp.asarray(start), jax.random.uniform(first, (runs,)))
 
     def step(r, piece):
         T, u = piece
         r = pick(T[r], u)
         return r, r
 
-    return jax.lax.scan(step, r0, (transitions, jax.random.uniform(rest, (len(transitions), runs))))[1]
+    return jax.lax.scan(step, pick(jnp.asarray(start), u[0]), (transitions, u[1:]))[1]
+
+
+def draw_sight(
+    key: Array, start: Float[Array, " modes"], transitions: Float[Array, "steps modes modes"], runs: int
+) -> Int[Array, "steps runs"]:
+    """Sight of one link at steps 1..K; the chain starts at step 0."""
+    return sight_from_uniforms(start, transitions, jax.random.uniform(key, (len(transitions) + 1, runs)))
 
 
 def likelihood_ratios(
@@ -90,6 +94,12 @@ def likelihood_ratios(
     later = jax.vmap(lambda T, now, next: T[now, next])(transitions[1:], sight[:-1], sight[1:])
     log_p = jnp.cumsum(jnp.log(jnp.concatenate([first[None], later])), axis=0)
     return jnp.exp(log_p - jax.lax.stop_gradient(log_p))
+
+
+def equal_weights(ratios: Float[Array, "steps runs"], groups: int) -> Float[Array, "steps groups runs_per_group"]:
+    """Likelihood ratios as weights that sum to one in every group, which removes the noise of what all draws share."""
+    grouped = ratios.reshape(len(ratios), groups, -1)
+    return grouped / grouped.sum(-1, keepdims=True)
 
 
 def draw_noise(key: Array, noises: tuple[Noise, ...], sight: Int[Array, "*n"]) -> Float[Array, "*n"]:

@@ -5,6 +5,7 @@ and the bound obeys the covariance recursion ``P <- F P F' + Q``, ``P <- P (I + 
 """
 
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -21,10 +22,11 @@ from locbounds.precision import double_precision, traced
 from locbounds.quadrature import deviations
 from locbounds.result import Result
 from locbounds.scenario import Scenario
-from locbounds.simulation import draw_sight, likelihood_ratios
+from locbounds.simulation import equal_weights, likelihood_ratios, sight_from_uniforms
 
-SCHEDULES = 64  # sight schedules per group and block
-TRACKS = 64  # tracks per group and block
+SCHEDULES = 32  # sight schedules per group and block
+SCHEDULES_FOR_GEOMETRY = 4  # per group: enough for how the bound changes with the geometry
+TRACKS = 16  # tracks per group and block
 
 
 def conditional_recursion(
@@ -57,52 +59,67 @@ def _geometry(scenario, expectation, seed, block, *, groups) -> Float[Array, "gr
     return jnp.einsum("lgnka,lgnkb->glkab", u, u) / u.shape[2]
 
 
-@partial(jax.jit, static_argnames=("groups", "los_ranges_only"))
-def _schedules(
-    scenario, seed, block, *, groups, los_ranges_only
-) -> tuple[Float[Array, "groups schedules links steps"], Float[Array, "groups schedules steps"]]:
+class _Schedules(NamedTuple):
     """Information of every range about its own distance, for random sight schedules, and their weights in the mean.
 
-    The weights are equal; their derivatives make those of the mean right, as drawing a schedule has none.
+    The weights are equal (None: without their derivatives, which make those of the mean right: a draw has none).
     """
+
+    information: Float[Array, "groups schedules links steps"]
+    weights: Float[Array, "steps groups schedules"] | None
+
+
+@partial(jax.jit, static_argnames=("groups", "los_ranges_only", "differentiable"))
+def _schedules(scenario, seed, block, *, groups, los_ranges_only, differentiable) -> _Schedules:
+    """Random sight schedules in antithetic pairs."""
     rows, ratios = [], 1.0
     for m, link in enumerate(scenario.links):
         process = noise_process(scenario, link)
         key = jax.random.fold_in(block_key(seed, Stream.SCHEDULES, block), m)
-        sight = draw_sight(key, process.start, process.transitions, groups * SCHEDULES)
-        ratios = ratios * likelihood_ratios(sight, process.start, process.transitions)
-        sight = sight.T
+        u = jax.random.uniform(key, (len(process.transitions) + 1, groups * SCHEDULES // 2))
+        sight = sight_from_uniforms(process.start, process.transitions, jnp.stack([u, 1 - u], -1).reshape(len(u), -1))
+        if differentiable:
+            ratios = ratios * likelihood_ratios(sight, process.start, process.transitions)
         info = mode_information(process)
         info = info * (jnp.arange(len(info)) == 0) if los_ranges_only else info
-        rows.append((info[sight] * process.reports).reshape(groups, SCHEDULES, -1))
-    ratios = ratios.T.reshape(groups, SCHEDULES, -1)
-    return jnp.stack(rows, 2), ratios / ratios.sum(1, keepdims=True)
+        rows.append((info[sight.T] * process.reports).reshape(groups, SCHEDULES, -1))
+    return _Schedules(jnp.stack(rows, 2), equal_weights(jnp.asarray(ratios), groups) if differentiable else None)
 
 
 @jax.jit
-def _block(scenario, info, weights, G, G_mean):
-    """Group means over schedules of the covariance, the position mse, and the mse's change with the geometry."""
+def _group_means(scenario, schedules, G) -> Float[Array, "groups times state state"]:
+    """Group means over schedules of the bound for a known schedule."""
+
+    def one(info):
+        return conditional_recursion(scenario, jnp.einsum("lk,lkab->kab", info, G))
+
+    if schedules.weights is None:
+        return jax.vmap(lambda group: jax.vmap(one)(group).mean(0))(schedules.information)
+    weights = jnp.concatenate([schedules.weights[:1], schedules.weights])  # step 0 is the same for every schedule
+    return jnp.einsum("kgs,gskij->gkij", weights, jax.vmap(jax.vmap(one))(schedules.information))
+
+
+@jax.jit
+def _geometry_deviations(scenario, info, G) -> Float[Array, "groups times"]:
+    """Each group's deviation of the position mse that is due to its tracks, to first order, over these schedules."""
     index = np.array(scenario.motion.position_index)
+    mean = G.mean(0)
 
-    def one(info, change):  # one schedule; the change of its mse with the geometry, by a directional derivative
-        def mse(G):
-            P = conditional_recursion(scenario, jnp.einsum("lk,lkab->kab", info, G))
-            return P[:, index, index].sum(-1), P
+    def deviation(info, change):
+        def position_mse(G):
+            return conditional_recursion(scenario, jnp.einsum("lk,lkab->kab", info, G))[:, index, index].sum(-1)
 
-        (value, tangent, P) = jax.jvp(mse, (G_mean,), (change,), has_aux=True)
-        return P, value, tangent
+        return jax.jvp(position_mse, (mean,), (change,))[1]
 
     G = jnp.broadcast_to(G, (info.shape[0], *G.shape[1:]))
-    P, mse, change = jax.vmap(jax.vmap(one, (0, None)), (0, 0))(info, G - G_mean)
-    with_prior = jnp.concatenate([weights[..., :1], weights], -1)  # step 0 is the same for every schedule
-    P = jnp.einsum("gsk,gskij->kij", with_prior, P) / len(P)
-    return P, jnp.sum(with_prior * mse, 1), jnp.sum(with_prior * change, 1)
+    return jax.vmap(jax.vmap(deviation, (0, None)))(info, G - mean).mean(1)
 
 
 def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, progress, conditions=()) -> Result:
     """The common part of enumer and los-only, which differ in the information of NLOS ranges and in the verdict."""
     expectation, verdict = prepare(id, scenario, expectation, conditions)
-    target = check_rtol(rtol, samples, traced(scenario, expectation))
+    differentiable = traced(scenario, expectation)
+    target = check_rtol(rtol, samples, differentiable)
     seed_key = np.uint32(check_seed(seed))
     blocks = None if samples is None else -(-samples // (GROUPS * SCHEDULES))
 
@@ -110,29 +127,38 @@ def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, prog
         tables = [_geometry(scenario, expectation, seed_key, np.uint32(b), groups=GROUPS) for b in range(count)]
         return sum(tables[1:], start=tables[0]) / count
 
-    def draw(block: int, G: Array):
-        b, los_ranges_only = np.uint32(block), id == "los-only"
-        info, weights = _schedules(scenario, seed_key, b, groups=GROUPS, los_ranges_only=los_ranges_only)
-        return _block(scenario, info, weights, G, G.mean(0))
+    def schedules(block: int) -> _Schedules:
+        return _schedules(
+            scenario,
+            seed_key,
+            np.uint32(block),
+            groups=GROUPS,
+            los_ranges_only=id == "los-only",
+            differentiable=differentiable,
+        )
 
-    def estimate_from(tables) -> Estimate:
-        P, mse, change = tables
-        mean, spread = deviations(mse)
-        return Estimate(P, mean, spread + change)
+    def estimate_from(group_means: Array) -> Estimate:
+        P, spread = deviations(group_means)
+        return Estimate(P, P[:, index, index].sum(-1), spread[:, :, index, index].sum(-1) + from_tracks)
 
-    tracks = blocks or 1  # blocks of tracks: doubled until the geometry leaves half of the error to the schedules
-    G = geometry(tracks)
-    while blocks is None and expectation.random and tracks < MAX_BLOCKS and not traced(scenario):
-        P, mse, change = draw(0, G)
-        if relative_error(Estimate(P, mse.mean(0), change)) <= target / 2:
+    index = np.array(scenario.motion.position_index)
+    few = _Schedules(schedules(0).information[:, :SCHEDULES_FOR_GEOMETRY], None)
+    tracks = blocks or 1  # blocks of tracks: doubled until they cause at most half of the permitted error
+    while True:
+        G = geometry(tracks)
+        from_tracks = _geometry_deviations(scenario, few.information, G)
+        if blocks is not None or not expectation.random or differentiable or tracks >= MAX_BLOCKS:
+            break
+        P = _group_means(scenario, few, G.mean(0)).mean(0)
+        if relative_error(Estimate(P, P[:, index, index].sum(-1), from_tracks)) <= target / 2:
             break
         tracks *= 2
-        G = geometry(tracks)
+    G_mean = G.mean(0)
     estimate, done = refine(
-        lambda block: draw(block, G),
+        lambda block: _group_means(scenario, schedules(block), G_mean),
         estimate_from,
         rtol=target,
-        blocks=blocks or (1 if traced(scenario, expectation) else None),
+        blocks=blocks or (1 if differentiable else None),
         samples_per_block=GROUPS * SCHEDULES,
         progress=progress,
     )
@@ -159,7 +185,7 @@ def enumer(
     scenario, rtol, seed, expectation, progress
         As for :func:`locbounds.bcrb`.
     samples
-        A fixed number of sight sequences instead of a precision (rounded up to whole blocks of 2048).
+        A fixed number of sight sequences instead of a precision (rounded up to whole blocks of 1024).
 
     Returns
     -------

@@ -33,10 +33,10 @@ def is_positive_semidefinite(a: Float[Array, "n n"]) -> bool:
 
 @jax.custom_jvp
 def psd_root(a: Float[Array, "*batch n n"]) -> Float[Array, "*batch n n"]:
-    """The symmetric square root ``S`` with ``S @ S == a`` of a symmetric positive semidefinite, possibly singular matrix.
+    """The symmetric square root ``S`` with ``S @ S == a`` of a positive semidefinite, possibly singular matrix.
 
     Unlike the eigenvectors it is made from, it is unique, and differentiable where eigenvalues coincide (as those of
-    motions do that treat their axes alike); along directions in which ``a`` is singular its derivative is taken as zero.
+    motions do that treat their axes alike); where ``a`` is singular its derivative is taken as zero.
 
     >>> root = psd_root(jnp.array([[4.0, 0.0], [0.0, 0.0]]))
     >>> (root @ root).tolist()
