@@ -48,6 +48,8 @@ def stationary(transition: Float[Array, "modes modes"]) -> Float[Array, " modes"
     if traced(transition):
         ones = jnp.ones((n, n))  # pi (I - T + ones) = (1, ..., 1), as pi (I - T) = 0 and pi sums to one
         return jnp.linalg.solve((jnp.eye(n) - transition + ones).T, jnp.ones(n))
+    if not np.all(np.isfinite(transition)):
+        return np.full(n, 1 / n)  # the chain itself is refused
     equations = np.vstack([transition.T - np.eye(n), np.ones(n)])
     if np.linalg.matrix_rank(equations) < n:
         return np.full(n, 1 / n)
