@@ -16,6 +16,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "motion": ["ConstantVelocity"],
         "noise": ["Gaussian", "GaussianMixture"],
         "priors": ["GaussianPrior"],
+        "report": ["plot"],
         "result": ["Result", "tightest"],
         "scenario": ["Link", "Scenario"],
         "sight": ["DwellSight", "KnownSight", "MarkovSight"],
