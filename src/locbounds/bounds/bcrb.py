@@ -40,46 +40,49 @@ def _distinct(processes: list[NoiseProcess]) -> list[int]:
     return first
 
 
-@partial(jax.jit, static_argnames=("groups", "window"))
+@partial(jax.jit, static_argnames=("groups", "window", "sharing"))
 def _geometry(
-    scenario, expectation, seed, block, *, groups, window
-) -> Float[Array, "groups links steps window space space"]:
-    """Group means of ``grad h(x_n) grad h(x_{n-lag})^T`` for every step n and lag."""
+    scenario, expectation, seed, block, *, groups, window, sharing
+) -> Float[Array, "groups processes steps window space space"]:
+    """Group means of ``grad h(x_n) grad h(x_{n-lag})^T`` for every step n and lag, summed over links that share noise."""
     paths = groups * TRACKS if expectation.random else 1
     u = directions(scenario, expectation, block_key(seed, Stream.TRACKS, block), paths)
     u = u.reshape(u.shape[0], groups if expectation.random else 1, -1, *u.shape[2:])
-    return jnp.einsum("lgnka,lgnkib->glkiab", u, windows(u, window)) / u.shape[2]
+    by_link = jnp.einsum("lgnka,lgnkib->lgkiab", u, windows(u, window)) / u.shape[2]
+    return jnp.stack([by_link[np.array(links)].sum(0) for links in sharing], axis=1)
 
 
-def _information(C, G, which) -> Float[Array, "steps window space window space"]:
-    """Increments of the information about positions at ages i, j: noise part times geometry part, summed over links."""
-    window = C.shape[-1]
-    i, j = np.meshgrid(np.arange(window), np.arange(window), indexing="ij")
-    newer, lag = np.minimum(i, j), np.abs(i - j)
+def _information(C, G) -> Float[Array, "steps window space window space"]:
+    """Increments of the information about positions at ages i, j: noise part times geometry part, summed."""
+    window, steps = C.shape[-1], G.shape[1]
     padded = jnp.concatenate([jnp.zeros((len(G), window - 1, *G.shape[2:])), G], axis=1)  # nothing before step 1
-    step = np.arange(G.shape[1])[:, None, None] + window - 1 - newer
-    pairs = padded[:, step, lag]  # E[u(newer) u(older)']
-    pairs = jnp.where((i <= j)[..., None, None], pairs, jnp.swapaxes(pairs, -1, -2))
-    return jnp.einsum("lkij,lkijab->kiajb", C[which], pairs)
+    rows = []
+    for i in range(window):  # newer member at age i, the other one j - i steps before it
+        pairs = jax.lax.slice_in_dim(padded, window - 1 - i, window - 1 - i + steps, axis=1)[:, :, : window - i]
+        row = jnp.sum(C[:, :, i, i:, None, None] * pairs, 0)
+        rows.append(jnp.pad(row, ((0, 0), (i, 0), (0, 0), (0, 0))))
+    upper = jnp.swapaxes(jnp.stack(rows, axis=1), 2, 3)
+    i, j = np.meshgrid(np.arange(window), np.arange(window), indexing="ij")
+    return jnp.where((i <= j)[:, None, :, None], upper, jnp.transpose(upper, (0, 3, 4, 1, 2)))
 
 
 @jax.jit
-def _covariances(scenario, C, G, which) -> Float[Array, "times state state"]:
+def _covariances(scenario, C, G) -> Float[Array, "times state state"]:
     """Bound at every step from the means over all groups."""
-    return covariance_recursion(scenario, _information(C, G, which))
+    return covariance_recursion(scenario, _information(C, G))
 
 
 @jax.jit
-def _deviations(scenario, C, G, which) -> Float[Array, "groups times"]:
+def _deviations(scenario, C, G) -> Float[Array, "groups times"]:
     """Each group's deviation of the position mean square error, to first order (delta method)."""
     C_mean, G_mean = C.mean(0), G.mean(0)
     index = np.array(scenario.motion.position_index)
-    mean = _information(C_mean, G_mean, which)
+    mean = _information(C_mean, G_mean)
 
     def some_groups(start):
         def change(C_group, G_group):  # independent draws of noise and geometry: their deviations add
             noise, geometry = (C_group - C_mean, G_mean), (C_mean, G_group - G_mean)
-            return _information(*noise, which) + _information(*geometry, which)
+            return _information(*noise) + _information(*geometry)
 
         C_some, G_some = (jax.lax.dynamic_slice_in_dim(x, start, GROUPS_AT_ONCE) for x in (C, G))
         return covariance_deviations(scenario, mean, jax.vmap(change)(C_some, G_some))[..., index, index].sum(-1)
@@ -88,14 +91,12 @@ def _deviations(scenario, C, G, which) -> Float[Array, "groups times"]:
     return jax.lax.map(some_groups, jnp.arange(0, len(C), GROUPS_AT_ONCE)).reshape(len(C), -1)
 
 
-def _truncation(scenario, C, G, which) -> float:
+def _truncation(scenario, C, G) -> float:
     """Largest relative change of the position RMSE when the window is shortened by a quarter."""
     index = np.array(scenario.motion.position_index)
     C, G = C.mean(0), G.mean(0)
     kept = np.arange(C.shape[-1]) < -(-3 * C.shape[-1] // 4)
-    full, shorter = (
-        _covariances(scenario, c, G, which)[:, index, index].sum(-1) for c in (C, C * (kept[:, None] & kept))
-    )
+    full, shorter = (_covariances(scenario, c, G)[:, index, index].sum(-1) for c in (C, C * (kept[:, None] & kept)))
     return float(jnp.max(jnp.abs(jnp.sqrt(shorter / full) - 1)))
 
 
@@ -216,7 +217,7 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
     processes = [noise_process(scenario, link) for link in scenario.links]
     first = _distinct(processes)
     distinct = sorted(set(first))
-    which = np.array([distinct.index(i) for i in first])
+    sharing = tuple(tuple(m for m, i in enumerate(first) if i == process) for process in distinct)
     index = np.array(scenario.motion.position_index)
     size = min(FIRST_WINDOW if window is None else window, scenario.steps)
     fixed = samples is not None or traced(scenario, expectation)
@@ -230,17 +231,18 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
                 score_covariance_increments(processes[i], seed_key, b, groups=groups, paths=PATHS, window=size)
                 for i in distinct
             ]
-            return jnp.stack(C, axis=1), _geometry(scenario, expectation, seed_key, b, groups=groups, window=size)
+            G = _geometry(scenario, expectation, seed_key, b, groups=groups, window=size, sharing=sharing)
+            return jnp.stack(C, axis=1), G
 
         def evaluate(tables) -> Estimate:
             C, G = tables
-            P = _covariances(scenario, C.mean(0), G.mean(0), which)
-            return Estimate(P, P[:, index, index].sum(-1), _deviations(scenario, C, G, which))
+            P = _covariances(scenario, C.mean(0), G.mean(0))
+            return Estimate(P, P[:, index, index].sum(-1), _deviations(scenario, C, G))
 
         first_block = draw(0)
         truncation = 0.0
         if window is None and size < scenario.steps and not traced(scenario, expectation):
-            truncation = _truncation(scenario, *first_block, which)
+            truncation = _truncation(scenario, *first_block)
             if truncation > rtol_target / 10:
                 size = min(2 * size, scenario.steps)
                 continue

@@ -23,9 +23,9 @@ from locbounds.result import Result
 from locbounds.scenario import Scenario
 from locbounds.simulation import sight_from_uniforms
 
-SCHEDULES = 64  # sight schedules per group and block
+SCHEDULES = 32  # sight schedules per group and block
 SCHEDULES_FOR_GEOMETRY = 4  # per group: enough for how the bound changes with the geometry
-TRACKS = 64  # tracks per group and block
+TRACKS = 16  # tracks per group and block
 
 
 def conditional_recursion(
@@ -161,7 +161,7 @@ def enumer(
     scenario, rtol, seed, expectation, progress
         As for :func:`locbounds.bcrb`.
     samples
-        A fixed number of sight sequences instead of a precision (rounded up to whole blocks of 2048).
+        A fixed number of sight sequences instead of a precision (rounded up to whole blocks of 1024).
 
     Returns
     -------
