@@ -44,7 +44,7 @@ def _distinct(processes: list[NoiseProcess]) -> list[int]:
 def _geometry(
     scenario, expectation, seed, block, *, groups, window, sharing
 ) -> Float[Array, "groups processes steps window space space"]:
-    """Group means of ``grad h(x_n) grad h(x_{n-lag})^T`` for every step n and lag, summed over links that share noise."""
+    """Group means of ``grad h(x_n) grad h(x_{n-lag})^T`` by step n and lag, summed over links that share noise."""
     paths = groups * TRACKS if expectation.random else 1
     u = directions(scenario, expectation, block_key(seed, Stream.TRACKS, block), paths)
     u = u.reshape(u.shape[0], groups if expectation.random else 1, -1, *u.shape[2:])
