@@ -21,10 +21,8 @@ def textbook_tracks(scenario, z):
     "options",
     [
         {"dim": 2},
-        {"dim": 3},
         {"dim": 2, "discrete": True},  # Q singular
-        {"dim": 2, "outliers": True},
-        {"dim": 3, "links": 1},
+        {"dim": 3, "links": 2, "outliers": True},
     ],
     ids=str,
 )
@@ -47,7 +45,7 @@ def test_irregular_times_and_dwell_times():
 
 
 def test_filterpy_imm_of_ekfs(paper):
-    """FilterPy's IMMEstimator over eight of its EKFs. Its Markov matrix has rows that sum to one, whatever its docs say."""
+    """FilterPy's IMMEstimator over eight of its EKFs; rows of its Markov matrix sum to one, whatever its docs say."""
     kalman = pytest.importorskip("filterpy.kalman")
     scenario, draws = paper
     model = double_precision(lower)(scenario.replace(links=awkward_chains(scenario.links)))

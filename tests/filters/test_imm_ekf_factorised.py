@@ -11,7 +11,7 @@ from locbounds.precision import double_precision
 ROUNDING = 1e-8  # metres; the same algebra in another order
 
 
-@pytest.mark.parametrize("options", [{"dim": 2}, {"dim": 3}, {"dim": 2, "outliers": True}], ids=str)
+@pytest.mark.parametrize("options", [{"dim": 2}, {"dim": 3, "outliers": True}], ids=str)
 def test_linear_cost_equals_the_quadratic_textbook(options):
     scenario = awkward(**options)
     model = double_precision(lower)(scenario)
@@ -22,9 +22,8 @@ def test_linear_cost_equals_the_quadratic_textbook(options):
     np.testing.assert_allclose(ours.covariance, [P for _, P in expected], rtol=1e-9, atol=1e-7)
 
 
-@pytest.mark.parametrize("outliers", [False, True])
-def test_one_link_is_the_joint_filter(outliers):
-    scenario = awkward(2, links=2, outliers=outliers)
+def test_one_link_is_the_joint_filter():
+    scenario = awkward(2, links=2, outliers=True)
     scenario = scenario.replace(links=scenario.links[1:])
     z = with_gaps(lb.simulate(scenario, runs=3, seed=1).measurements)
     ours, joint = FactorisedImmEkf()(scenario, z), ImmEkf()(scenario, z)
@@ -52,11 +51,17 @@ def test_a_hundred_anchors():
     noises = lb.Gaussian(0.0, 10.0), lb.Gaussian(30.0, 30.0)
     links = [lb.Link(f"a{m}", lb.Range(rng.uniform(-500, 500, 2)), sight, noises) for m in range(100)]
     scenario = scenario.replace(links=links)
-    draws = lb.simulate(scenario, runs=256, seed=1)
-    estimates = FactorisedImmEkf()(scenario, draws.measurements)
+    states = lb.simulate(scenario.replace(links=links[:3]), runs=256, seed=1).states
+    now, sight = rng.random((256, 100)) < 1 / 3, np.empty((256, 12, 100), int)
+    for k in range(12):
+        now = rng.random((256, 100)) < np.where(now, 0.9, 0.2)
+        sight[:, k] = now
+    distance = np.linalg.norm(states[:, 1:, None, :2] - scenario.anchors, axis=-1)
+    z = distance + rng.normal(np.where(sight, 30.0, 0.0), np.where(sight, 30.0, 10.0))
+    estimates = FactorisedImmEkf()(scenario, z)
     assert not estimates.diverged.any()
-    error = (estimates.mean - draws.states)[:, 3:]
-    oracle = (OracleEkf()(scenario, draws.measurements, 0, draws.sight).mean - draws.states)[:, 3:]
+    error = (estimates.mean - states)[:, 3:]
+    oracle = (OracleEkf()(scenario, z, 0, sight).mean - states)[:, 3:]
     assert (error[..., :2] ** 2).mean() < 2 * (oracle[..., :2] ** 2).mean()
     nees = np.einsum("rki,rkij,rkj->rk", error, np.linalg.inv(estimates.covariance[:, 3:]), error).mean(1)
     assert abs(nees.mean() - 4) < 4 * nees.std() / 16 + 0.2  # 0.2: linearisation and mode errors, 5 %

@@ -13,7 +13,7 @@ from locbounds.precision import double_precision
 ROUNDING = 1e-8  # metres; the same algebra in another order
 
 
-@pytest.mark.parametrize("options", [{"dim": 2}, {"dim": 3, "discrete": True}, {"dim": 2, "outliers": True}], ids=str)
+@pytest.mark.parametrize("options", [dict(dim=2), dict(dim=3, discrete=True), dict(dim=2, outliers=True)], ids=str)
 def test_reproduces_the_textbook(options):
     scenario = awkward(**options)
     model = double_precision(lower)(scenario)

@@ -109,7 +109,7 @@ def imm_kf(model: Model, z: Array, *, weighted: bool, covariance: bool) -> tuple
         filters, position = carry
         filters, ((r, rate), V) = smooth(filters, piece)
         weights = materialise([1.0 / V[i, i] if weighted else jnp.ones_like(r) for i in range(2)])
-        position = materialise(locate(position, anchors, r, weights[0]))
+        position = materialise(locate(position, anchors, r, weights[0], 1.0 / V[0, 0]))
         _, u = direction(position, anchors.T[:, :, None])
 
         gains = []  # d position / d ranges and d velocity / d rates, [space] of [links, tracks]

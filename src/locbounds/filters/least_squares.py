@@ -12,7 +12,7 @@ from locbounds.filters.tracks_last import Symmetric, Vector, dot, materialise, s
 ITERATIONS = 8
 RIDGE = 1e-12  # relative: keeps a singular geometry solvable, far below what a position accuracy can notice
 DAMPING = 1e-6  # relative, at the start: practically Gauss-Newton
-CLEARLY_BETTER = 0.5  # share of the cost below which another minimum replaces the tracked one
+CLEARLY_BETTER = 25.0  # by how much the squared normalised residuals must differ for the track to jump: 5 deviations
 
 
 def _normal_equations(
@@ -36,7 +36,7 @@ def damped(G: Symmetric, damping: Array | float) -> Symmetric:
     return {(i, j): G[i, j] + extra if i == j else G[i, j] for i, j in G}
 
 
-def _descend(start: Vector, anchors: Array, ranges: Array, weights: Array) -> tuple[Vector, Array]:
+def _descend(start: Vector, anchors: Array, ranges: Array, weights: Array) -> Vector:
     """Levenberg-Marquardt with a fixed number of steps; a step that does not lower the cost is not taken."""
 
     def iterate(_: Any, carry: Any) -> Any:
@@ -52,8 +52,7 @@ def _descend(start: Vector, anchors: Array, ranges: Array, weights: Array) -> tu
 
     first = materialise(_normal_equations(start, anchors, ranges, weights))
     carry = start, jnp.full_like(start[0], DAMPING), first
-    position, _, (cost, _, _) = jax.lax.fori_loop(0, ITERATIONS, iterate, carry)
-    return position, cost
+    return jax.lax.fori_loop(0, ITERATIONS, iterate, carry)[0]
 
 
 def _linear_solution(anchors: Array, ranges: Array, weights: Array) -> Vector:
@@ -69,11 +68,12 @@ def _linear_solution(anchors: Array, ranges: Array, weights: Array) -> Vector:
     return [c + m for c, m in zip(x, centre, strict=True)]
 
 
-def locate(start: Vector, anchors: Array, ranges: Array, weights: Array) -> Vector:
+def locate(start: Vector, anchors: Array, ranges: Array, weights: Array, precision: Array) -> Vector:
     """Minimise ``sum_l w_l (range_l - |p - a_l|)^2`` over the position p.
 
-    Two descents, one from the given start and one from the solution of the linearised equations; the second is taken
-    only if it fits clearly better, so that a mirror image with the same cost does not capture the track.
+    Two descents, one from the given start and one from the solution of the linearised equations. The second is taken
+    only if the ranges contradict the first, measured against their own variances: behind nearly collinear anchors lies
+    a mirror image that fits about as well, and must not capture the track.
 
     Parameters
     ----------
@@ -81,10 +81,11 @@ def locate(start: Vector, anchors: Array, ranges: Array, weights: Array) -> Vect
         Position to start from, [space] of [tracks].
     anchors
         [links, space] metres.
-    ranges, weights
-        [links, tracks].
+    ranges, weights, precision
+        [links, tracks]; precision are the inverse variances of the ranges.
     """
-    near, cost = _descend(start, anchors, ranges, weights)
-    far, other = _descend(_linear_solution(anchors, ranges, weights), anchors, ranges, weights)
-    switch = other < CLEARLY_BETTER * cost
+    near = _descend(start, anchors, ranges, weights)
+    far = _descend(_linear_solution(anchors, ranges, weights), anchors, ranges, weights)
+    misfit, other = (_normal_equations(p, anchors, ranges, precision)[0] for p in (near, far))
+    switch = materialise(misfit > other + CLEARLY_BETTER)
     return [jnp.where(switch, b, a) for a, b in zip(near, far, strict=True)]

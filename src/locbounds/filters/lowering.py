@@ -65,30 +65,30 @@ def lower(scenario: Scenario) -> Model:
             f"links have different numbers of sight conditions: {sorted(modes)}",
             "Give every link the same number; a condition may have probability zero",
         )
-    order = state_order(scenario)
+    xp = jnp if traced(scenario) else np  # NumPy does not compile each of these small steps
+    index = np.array(state_order(scenario))
     mixtures = [[noise.components() for noise in link.noises] for link in scenario.links]
     size = max(len(weights) for row in mixtures for weights, _, _ in row)
 
     def padded(values: Array, filling: float) -> Array:
-        return jnp.concatenate([jnp.asarray(values), jnp.full(size - len(values), filling)])
+        return xp.concatenate([xp.asarray(values), xp.full(size - len(values), filling)])
 
     def table(which: int, filling: float) -> Array:
-        return jnp.stack([jnp.stack([padded(mixture[which], filling) for mixture in row]) for row in mixtures])
+        return xp.stack([xp.stack([padded(mixture[which], filling) for mixture in row]) for row in mixtures])
 
     intervals = scenario.times.intervals
-    model = Model(
-        F=scenario.transition[:, order][:, :, order],
-        Q=scenario.process_noise[:, order][:, :, order],
-        m0=scenario.prior.mean[np.array(order)],
-        P0=scenario.prior.covariance[np.ix_(order, order)],
+    return Model(
+        F=xp.asarray(scenario.transition)[:, index][:, :, index],
+        Q=xp.asarray(scenario.process_noise)[:, index][:, :, index],
+        m0=scenario.prior.mean[index],
+        P0=scenario.prior.covariance[index][:, index],
         anchors=scenario.anchors,
         weights=table(0, 0.0),
         means=table(1, 0.0),
         variances=table(2, 1.0),
-        start=jnp.stack([jnp.asarray(link.sight.start) for link in scenario.links]),
-        transitions=jnp.stack([link.sight.transitions(intervals) for link in scenario.links]),
+        start=xp.stack([xp.asarray(link.sight.start) for link in scenario.links]),
+        transitions=xp.stack([xp.asarray(link.sight.transitions(intervals)) for link in scenario.links]),
     )
-    return model if traced(model) else Model(*(np.asarray(a) for a in model))
 
 
 def check_measurements(scenario: Scenario, z: Any) -> Array:

@@ -66,29 +66,35 @@ def over_tracks(
     size = max(8, ELEMENTS // hypotheses) if on_cpu else ACCELERATOR_TRACKS
     size = min(size, 1 << max(3, (runs - 1).bit_length()))  # few shapes, few compilations
     model = jax.tree.map(jnp.asarray, model)
-    shapes = jax.eval_shape(functools.partial(kernel, **static), model, *(_chunk(d, 0, size) for d in data))
-    results = [None if s is None else np.empty((runs, s.shape[0] + 1, *s.shape[1:-1])) for s in shapes]
+
+    def compute(begin: int) -> tuple[np.ndarray | None, ...]:
+        with jax.enable_x64(True):  # the scope is per thread
+            parts = run(model, *(_chunk(d, begin, size) for d in data), **static)
+            return tuple(None if part is None else np.moveaxis(np.asarray(part), -1, 0) for part in parts)
+
+    def store(begin: int, parts: tuple[np.ndarray | None, ...]) -> None:
+        for result, part in zip(results, parts, strict=True):
+            if result is not None and part is not None:
+                rows = result[begin : begin + size, 1:]
+                rows[...] = part[: len(rows)]
+
+    parts = compute(0)  # compiles, once
+    results = [None if p is None else np.empty((runs, p.shape[1] + 1, *p.shape[2:])) for p in parts]
     for result, row in zip(results, first, strict=True):
         if result is not None:
             result[:, 0] = row
-
-    def work(begin: int) -> None:
-        with jax.enable_x64(True):  # the scope is per thread
-            parts = run(model, *(_chunk(d, begin, size) for d in data), **static)
-            for result, part in zip(results, parts, strict=True):
-                if result is not None:
-                    rows = result[begin : begin + size, 1:]
-                    rows[...] = np.moveaxis(np.asarray(part), -1, 0)[: len(rows)]
-
-    begins = range(0, runs, size)
-    work(0)  # compiles, once
-    workers = min(
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, len(begins)
-    )
-    if workers > 1:
+    store(0, parts)
+    rest = range(size, runs, size)
+    workers = min(_cores(), len(rest))
+    if workers:
         with ThreadPoolExecutor(workers) as pool:
-            list(pool.map(work, begins[1:]))
+            list(pool.map(lambda begin: store(begin, compute(begin)), rest))
     return tuple(results)
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _with_first(row: Array, later: Array) -> Array:
