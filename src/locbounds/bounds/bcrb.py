@@ -142,8 +142,9 @@ def bcrb(
     Result
         ``covariance`` [steps+1, state, state] is the bound on the mean square error matrix of any estimator of x_k
         from z_1..z_k. ``diagnostics["truncation"]`` is the relative change of the position RMSE, at the worst step,
-        when the window is shortened by a quarter: an estimate from above of the error made by truncating at the
-        window itself, since the entries left out decay geometrically; NaN where the window was given.
+        when the window is shortened by a quarter. It indicates the error made by truncating at the window itself, and
+        exceeds it where the entries left out decay quickly; it is no guarantee, and the error may have either sign.
+        NaN where the window was given.
 
     Raises
     ------
