@@ -3,7 +3,8 @@
 Docs tables, ``locbounds explain``, verdicts and the command line's choices are all made from it.
 """
 
-from typing import NamedTuple
+import importlib
+from typing import Any, NamedTuple
 
 from locbounds.errors import InputError
 from locbounds.scenario import Scenario
@@ -172,3 +173,55 @@ def method(id: str, kind: str | None = None) -> Method:
     near = difflib.get_close_matches(id, [m.id for m in known], n=1, cutoff=0.4)
     hint = f"Did you mean {near[0]}? " if near else ""
     raise InputError(f"unknown {kind or 'method'} {id!r}", f"{hint}Known: {', '.join(m.id for m in known)}")
+
+
+def load(entry: Method) -> Any:
+    """The callable of an entry, imported now.
+
+    >>> load(method("bcrb")).__name__
+    'bcrb'
+    """
+    module, _, name = entry.function.partition(":")
+    return getattr(importlib.import_module(module), name)
+
+
+def describe(entry: Method) -> dict[str, Any]:
+    """What a method is, sees and assumes, when it fails and whom to cite, as plain data.
+
+    >>> describe(method("enumer"))["sees"]
+    ['ranges', 'sight']
+    """
+    return {
+        "id": entry.id,
+        "name": entry.name,
+        "kind": entry.kind,
+        "summary": entry.summary,
+        "sees": sorted(entry.sees),
+        "assumes": [*entry.grounds, *(a.text for a in entry.assumptions)],
+        "fails": entry.fails,
+        "cite": list(entry.references),
+    }
+
+
+def explain(id: str) -> str:
+    """What a bound or filter assumes, when it misleads, and whom to cite.
+
+    Parameters
+    ----------
+    id
+        Id of a method, for example ``bcrb``.
+
+    Raises
+    ------
+    InputError
+        If the id is unknown; the nearest known one is named.
+
+    Examples
+    --------
+    >>> print(explain("bcrb").splitlines()[0])
+    BCRB (bcrb), a bound
+    """
+    entry = describe(method(id))
+    lines = [f"{entry['name']} ({entry['id']}), a {entry['kind']}", entry["summary"], ""]
+    lines += [f"sees     {', '.join(entry['sees'])}", *(f"assumes  {text}" for text in entry["assumes"])]
+    return "\n".join([*lines, f"careful  {entry['fails']}", f"cite     {', '.join(entry['cite'])}"])

@@ -1,6 +1,8 @@
 """The one result type of bounds and filters: labelled, with standard errors and provenance."""
 
 import datetime
+import functools
+import math
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -45,10 +47,12 @@ class Provenance(eqx.Module):
     @classmethod
     def now(cls, seed: int, samples: int, how: str, references: tuple[str, ...]) -> "Provenance":
         """Provenance with today's versions and date."""
-        names = ("locbounds", "jax", "numpy")
-        return cls(
-            seed, samples, how, references, tuple((n, version(n)) for n in names), datetime.date.today().isoformat()
-        )
+        return cls(seed, samples, how, references, _versions(), datetime.date.today().isoformat())
+
+
+@functools.cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    return tuple((name, version(name)) for name in ("locbounds", "jax", "numpy"))
 
 
 class Result(eqx.Module):
@@ -172,7 +176,7 @@ class Result(eqx.Module):
             float(standard_error(np.asarray(r.replicates).mean(axis=1))) / float(np.mean(r.position_mse))
             for r in (bound, self)
         ]
-        half = NORMAL_95 * float(np.hypot(*spreads))
+        half = NORMAL_95 * math.hypot(*spreads)
         low, high = (float(np.exp(log_ratio + d)) for d in (-half, half))
         return Efficiency(float(np.exp(log_ratio)), low, high)
 

@@ -70,7 +70,7 @@ def _scores(scenario, seed, block, *, samples) -> Float[Array, "samples horizons
             l = jnp.exp(log_l - log_l.max())
             f = l * (f @ T)
             D = l[:, None, None] * jnp.einsum("ij,inx->jnx", T, D)
-            D = D.at[:, k].add(f[:, None] * gradient)
+            D = jnp.asarray(D).at[:, k].add(f[:, None] * gradient)
             total = f.sum()
             f, D = f / total, D / total
             return (f, D), D.sum(0)
@@ -92,7 +92,7 @@ def _last_columns(scenario, J_z, horizon) -> Float[Array, "n state"]:
     n = scenario.motion.state_size
     size = n * (scenario.steps + 1)
     inside = jnp.arange(size) < (horizon + 1) * n
-    J = _prior_information(scenario, horizon).at[n:, n:].add(J_z.reshape(size - n, size - n))
+    J = jnp.asarray(_prior_information(scenario, horizon)).at[n:, n:].add(J_z.reshape(size - n, size - n))
     J = jnp.where(inside[:, None] & inside[None, :], J, jnp.eye(size))
     unit = jax.lax.dynamic_slice_in_dim(jnp.eye(size), horizon * n, n, axis=1)
     return jnp.linalg.solve(J, unit)

@@ -11,7 +11,7 @@ from locbounds.blocks import GROUPS, Stream, block_key, check_seed
 from locbounds.bounds.common import bound_result, prepare
 from locbounds.bounds.expectation import Expectation, directions, windows
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
-from locbounds.bounds.recursion import covariance_recursion
+from locbounds.bounds.recursion import covariance_deviations, covariance_recursion
 from locbounds.bounds.score_covariance import NoiseProcess, noise_process, score_covariance_increments
 from locbounds.precision import double_precision, traced
 from locbounds.result import Result
@@ -19,7 +19,8 @@ from locbounds.scenario import Scenario
 
 PATHS = 64  # noise paths per group and block
 TRACKS = 16  # tracks per group and block: the geometry varies far less than the noise
-FIRST_WINDOW = 8
+FIRST_WINDOW = 12
+GROUPS_AT_ONCE = 8
 TABLE_BYTES = 2.5e8  # the increments of one link, all groups, stay below this
 
 
@@ -39,50 +40,64 @@ def _distinct(processes: list[NoiseProcess]) -> list[int]:
     return first
 
 
-@partial(jax.jit, static_argnames=("groups", "window"))
+@partial(jax.jit, static_argnames=("groups", "window", "sharing"))
 def _geometry(
-    scenario, expectation, seed, block, *, groups, window
-) -> Float[Array, "links groups steps w space w space"]:
-    """Group means of ``grad h(x_n) grad h(x_n')^T`` over the window at every step."""
+    scenario, expectation, seed, block, *, groups, window, sharing
+) -> Float[Array, "groups processes steps window space space"]:
+    """Group means of ``grad h(x_n) grad h(x_{n-lag})^T`` by step n and lag, summed over links that share noise."""
     paths = groups * TRACKS if expectation.random else 1
     u = directions(scenario, expectation, block_key(seed, Stream.TRACKS, block), paths)
     u = u.reshape(u.shape[0], groups if expectation.random else 1, -1, *u.shape[2:])
-    u = windows(u, window)
-    return jnp.einsum("lgnkia,lgnkjb->lgkiajb", u, u) / u.shape[2]
+    by_link = jnp.einsum("lgnka,lgnkib->lgkiab", u, windows(u, window)) / u.shape[2]
+    return jnp.stack([by_link[np.array(links)].sum(0) for links in sharing], axis=1)
+
+
+def _information(C, G) -> Float[Array, "steps window space window space"]:
+    """Increments of the information about positions at ages i, j: noise part times geometry part, summed."""
+    window, steps = C.shape[-1], G.shape[1]
+    padded = jnp.concatenate([jnp.zeros((len(G), window - 1, *G.shape[2:])), G], axis=1)  # nothing before step 1
+    rows = []
+    for i in range(window):  # newer member at age i, the other one j - i steps before it
+        pairs = jax.lax.slice_in_dim(padded, window - 1 - i, window - 1 - i + steps, axis=1)[:, :, : window - i]
+        row = jnp.sum(C[:, :, i, i:, None, None] * pairs, 0)
+        rows.append(jnp.pad(row, ((0, 0), (i, 0), (0, 0), (0, 0))))
+    upper = jnp.swapaxes(jnp.stack(rows, axis=1), 2, 3)
+    i, j = np.meshgrid(np.arange(window), np.arange(window), indexing="ij")
+    return jnp.where((i <= j)[:, None, :, None], upper, jnp.transpose(upper, (0, 3, 4, 1, 2)))
 
 
 @jax.jit
-def _estimate(scenario, C, G, which) -> Estimate:
-    """Bound at every step, and each group's deviation of the position mean square error (delta method)."""
-    C_mean, G_mean = C.mean(1), G.mean(1)
+def _covariances(scenario, C, G) -> Float[Array, "times state state"]:
+    """Bound at every step from the means over all groups."""
+    return covariance_recursion(scenario, _information(C, G))
+
+
+@jax.jit
+def _deviations(scenario, C, G) -> Float[Array, "groups times"]:
+    """Each group's deviation of the position mean square error, to first order (delta method)."""
+    C_mean, G_mean = C.mean(0), G.mean(0)
     index = np.array(scenario.motion.position_index)
+    mean = _information(C_mean, G_mean)
 
-    def information(C, G):
-        return jnp.einsum("lkij,lkiajb->kiajb", C[which], G)
+    def some_groups(start):
+        def change(C_group, G_group):  # independent draws of noise and geometry: their deviations add
+            noise, geometry = (C_group - C_mean, G_mean), (C_mean, G_group - G_mean)
+            return _information(*noise) + _information(*geometry)
 
-    def position_mse(J):
-        P = covariance_recursion(scenario, J)
-        return P[:, index, index].sum(-1), P
+        C_some, G_some = (jax.lax.dynamic_slice_in_dim(x, start, GROUPS_AT_ONCE) for x in (C, G))
+        return covariance_deviations(scenario, mean, jax.vmap(change)(C_some, G_some))[..., index, index].sum(-1)
 
-    mse, tangent, P = jax.linearize(position_mse, information(C_mean, G_mean), has_aux=True)
-
-    def deviation(group):  # independent draws of noise and geometry: their deviations add
-        C_group, G_group = group
-        return tangent(information(C_group - C_mean, G_mean) + information(C_mean, G_group - G_mean))
-
-    G = jnp.broadcast_to(G, (G.shape[0], C.shape[1], *G.shape[2:]))
-    replicates = jax.lax.map(deviation, (jnp.moveaxis(C, 1, 0), jnp.moveaxis(G, 1, 0)), batch_size=8)
-    return Estimate(P, mse, replicates)
+    G = jnp.broadcast_to(G, (len(C), *G.shape[1:]))
+    return jax.lax.map(some_groups, jnp.arange(0, len(C), GROUPS_AT_ONCE)).reshape(len(C), -1)
 
 
-def _truncation(estimate, scenario, tables, which) -> float:
+def _truncation(scenario, C, G) -> float:
     """Largest relative change of the position RMSE when the window is shortened by a quarter."""
-    C, G = tables
-    cut = -(-3 * C.shape[-1] // 4)
-    shorter = _estimate(
-        scenario, C.mean(1, keepdims=True)[..., :cut, :cut], G.mean(1, keepdims=True)[..., :cut, :, :cut, :], which
-    )
-    return float(jnp.max(jnp.abs(jnp.sqrt(shorter.position_mse / estimate.position_mse) - 1)))
+    index = np.array(scenario.motion.position_index)
+    C, G = C.mean(0), G.mean(0)
+    kept = np.arange(C.shape[-1]) < -(-3 * C.shape[-1] // 4)
+    full, shorter = (_covariances(scenario, c, G)[:, index, index].sum(-1) for c in (C, C * (kept[:, None] & kept)))
+    return float(jnp.max(jnp.abs(jnp.sqrt(shorter / full) - 1)))
 
 
 @double_precision
@@ -202,7 +217,8 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
     processes = [noise_process(scenario, link) for link in scenario.links]
     first = _distinct(processes)
     distinct = sorted(set(first))
-    which = np.array([distinct.index(i) for i in first])
+    sharing = tuple(tuple(m for m, i in enumerate(first) if i == process) for process in distinct)
+    index = np.array(scenario.motion.position_index)
     size = min(FIRST_WINDOW if window is None else window, scenario.steps)
     fixed = samples is not None or traced(scenario, expectation)
     while True:
@@ -215,20 +231,28 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
                 score_covariance_increments(processes[i], seed_key, b, groups=groups, paths=PATHS, window=size)
                 for i in distinct
             ]
-            return jnp.stack(C), _geometry(scenario, expectation, seed_key, b, groups=groups, window=size)
+            G = _geometry(scenario, expectation, seed_key, b, groups=groups, window=size, sharing=sharing)
+            return jnp.stack(C, axis=1), G
 
-        def evaluate(tables):
-            return _estimate(scenario, *tables, which)
+        def evaluate(tables) -> Estimate:
+            C, G = tables
+            P = _covariances(scenario, C.mean(0), G.mean(0))
+            return Estimate(P, P[:, index, index].sum(-1), _deviations(scenario, C, G))
 
+        first_block = draw(0)
         truncation = 0.0
         if window is None and size < scenario.steps and not traced(scenario, expectation):
-            tables = draw(0)
-            truncation = _truncation(evaluate(tables), scenario, tables, which)
+            truncation = _truncation(scenario, *first_block)
             if truncation > rtol_target / 10:
                 size = min(2 * size, scenario.steps)
                 continue
         estimate, done = refine(
-            draw, evaluate, rtol=rtol_target, blocks=blocks, samples_per_block=groups * PATHS, progress=progress
+            lambda block, first=first_block, draw=draw: draw(block) if block else first,
+            evaluate,
+            rtol=rtol_target,
+            blocks=blocks,
+            samples_per_block=groups * PATHS,
+            progress=progress,
         )
         break
     how = f"noise and geometry separated, Louis' identity, window of {size} steps"

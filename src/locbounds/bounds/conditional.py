@@ -21,10 +21,11 @@ from locbounds.precision import double_precision, traced
 from locbounds.quadrature import deviations
 from locbounds.result import Result
 from locbounds.scenario import Scenario
-from locbounds.simulation import draw_sight
+from locbounds.simulation import sight_from_uniforms
 
-SCHEDULES = 64  # sight schedules per group and block
-TRACKS = 64  # tracks per group and block
+SCHEDULES = 32  # sight schedules per group and block
+SCHEDULES_FOR_GEOMETRY = 4  # per group: enough for how the bound changes with the geometry
+TRACKS = 16  # tracks per group and block
 
 
 def conditional_recursion(
@@ -59,12 +60,13 @@ def _geometry(scenario, expectation, seed, block, *, groups) -> Float[Array, "gr
 
 @partial(jax.jit, static_argnames=("groups", "los_ranges_only"))
 def _schedules(scenario, seed, block, *, groups, los_ranges_only) -> Float[Array, "groups schedules links steps"]:
-    """Information of every range about its own distance, for random sight schedules."""
+    """Information of every range about its own distance, for random sight schedules in antithetic pairs."""
     rows = []
     for m, link in enumerate(scenario.links):
         process = noise_process(scenario, link)
         key = jax.random.fold_in(block_key(seed, Stream.SCHEDULES, block), m)
-        sight = draw_sight(key, process.start, process.transitions, groups * SCHEDULES).T
+        u = jax.random.uniform(key, (len(process.transitions) + 1, groups * SCHEDULES // 2))
+        sight = sight_from_uniforms(process.start, process.transitions, jnp.stack([u, 1 - u], -1).reshape(len(u), -1)).T
         info = mode_information(process)
         info = info * (jnp.arange(len(info)) == 0) if los_ranges_only else info
         rows.append((info[sight] * process.reports).reshape(groups, SCHEDULES, -1))
@@ -72,21 +74,29 @@ def _schedules(scenario, seed, block, *, groups, los_ranges_only) -> Float[Array
 
 
 @jax.jit
-def _block(scenario, info, G, G_mean):
-    """Group means over schedules of the covariance, the position mse, and the mse's change with the geometry."""
+def _group_means(scenario, info, G) -> Float[Array, "groups times state state"]:
+    """Group means over schedules of the bound for a known schedule."""
+
+    def one(info):
+        return conditional_recursion(scenario, jnp.einsum("lk,lkab->kab", info, G))
+
+    return jax.vmap(lambda group: jax.vmap(one)(group).mean(0))(info)
+
+
+@jax.jit
+def _geometry_deviations(scenario, info, G) -> Float[Array, "groups times"]:
+    """Each group's deviation of the position mse that is due to its tracks, to first order, over these schedules."""
     index = np.array(scenario.motion.position_index)
+    mean = G.mean(0)
 
-    def one(info, change):  # one schedule; the change of its mse with the geometry, by a directional derivative
-        def mse(G):
-            P = conditional_recursion(scenario, jnp.einsum("lk,lkab->kab", info, G))
-            return P[:, index, index].sum(-1), P
+    def deviation(info, change):
+        def position_mse(G):
+            return conditional_recursion(scenario, jnp.einsum("lk,lkab->kab", info, G))[:, index, index].sum(-1)
 
-        (value, tangent, P) = jax.jvp(mse, (G_mean,), (change,), has_aux=True)
-        return P, value, tangent
+        return jax.jvp(position_mse, (mean,), (change,))[1]
 
     G = jnp.broadcast_to(G, (info.shape[0], *G.shape[1:]))
-    P, mse, change = jax.vmap(jax.vmap(one, (0, None)), (0, 0))(info, G - G_mean)
-    return P.mean((0, 1)), mse.mean(1), change.mean(1)
+    return jax.vmap(jax.vmap(deviation, (0, None)))(info, G - mean).mean(1)
 
 
 def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, progress, conditions=()) -> Result:
@@ -100,25 +110,28 @@ def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, prog
         tables = [_geometry(scenario, expectation, seed_key, np.uint32(b), groups=GROUPS) for b in range(count)]
         return sum(tables[1:], start=tables[0]) / count
 
-    def draw(block: int, G: Array):
-        info = _schedules(scenario, seed_key, np.uint32(block), groups=GROUPS, los_ranges_only=id == "los-only")
-        return _block(scenario, info, G, G.mean(0))
+    def schedules(block: int) -> Array:
+        return _schedules(scenario, seed_key, np.uint32(block), groups=GROUPS, los_ranges_only=id == "los-only")
 
-    def estimate_from(tables) -> Estimate:
-        P, mse, change = tables
-        mean, spread = deviations(mse)
-        return Estimate(P, mean, spread + change)
+    def estimate_from(group_means: Array) -> Estimate:
+        P, spread = deviations(group_means)
+        return Estimate(P, P[:, index, index].sum(-1), spread[:, :, index, index].sum(-1) + from_tracks)
 
-    tracks = blocks or 1  # blocks of tracks: doubled until the geometry leaves half of the error to the schedules
-    G = geometry(tracks)
-    while blocks is None and expectation.random and tracks < MAX_BLOCKS and not traced(scenario):
-        P, mse, change = draw(0, G)
-        if relative_error(Estimate(P, mse.mean(0), change)) <= target / 2:
+    index = np.array(scenario.motion.position_index)
+    few = schedules(0)[:, :SCHEDULES_FOR_GEOMETRY]
+    tracks = blocks or 1  # blocks of tracks: doubled until they cause at most half of the permitted error
+    while True:
+        G = geometry(tracks)
+        from_tracks = _geometry_deviations(scenario, few, G)
+        if blocks is not None or not expectation.random or traced(scenario) or tracks >= MAX_BLOCKS:
+            break
+        P = _group_means(scenario, few, G.mean(0)).mean(0)
+        if relative_error(Estimate(P, P[:, index, index].sum(-1), from_tracks)) <= target / 2:
             break
         tracks *= 2
-        G = geometry(tracks)
+    G_mean = G.mean(0)
     estimate, done = refine(
-        lambda block: draw(block, G),
+        lambda block: _group_means(scenario, schedules(block), G_mean),
         estimate_from,
         rtol=target,
         blocks=1 if traced(scenario, expectation) else blocks,
@@ -148,7 +161,7 @@ def enumer(
     scenario, rtol, seed, expectation, progress
         As for :func:`locbounds.bcrb`.
     samples
-        A fixed number of sight sequences instead of a precision (rounded up to whole blocks of 2048).
+        A fixed number of sight sequences instead of a precision (rounded up to whole blocks of 1024).
 
     Returns
     -------

@@ -30,28 +30,85 @@ def covariance_recursion(
     Notes
     -----
     Window covariance S of [x_k, position at age 1, ..., position at age W-1]; predict ``S <- T S T' + Q``, update
-    ``S <- S - S D (I + S_pp D)^-1 ...`` with the information increment D on the positions.
+    ``S <- S - S_p (I + D S_pp)^-1 D S_p'`` with the information increment D on the positions p.
     """
-    window, d = increments.shape[1:3]
     n = scenario.motion.state_size
-    position = np.array(scenario.motion.position_index)
-    size = n + d * (window - 1)
-    observed = np.concatenate([position, np.arange(n, size)])
-    shift = np.zeros((size, size))  # ages move on by one; the newest old position is taken from the state
-    if window > 1:
-        shift[n + np.arange(d), position] = 1.0
-    shift[np.arange(n + d, size), np.arange(n, size - d)] = 1.0
+    window = _Window(scenario, increments.shape[1])
 
     def step(S, inputs):
         F, Q, D = inputs
-        T = jnp.asarray(shift).at[:n, :n].set(F)
-        S = (T @ S @ T.T).at[:n, :n].add(Q)
-        D = D.reshape(window * d, window * d)
-        cross = S[:, observed]
-        S = symmetrize(S - cross @ jnp.linalg.solve(jnp.eye(window * d) + D @ cross[observed], D @ cross.T))
+        S = window.update(window.predict(S, F, Q), D)
         return S, S[:n, :n]
 
-    P0 = jnp.asarray(scenario.prior.covariance)
-    first = jnp.zeros((size, size)).at[:n, :n].set(P0)
-    _, later = jax.lax.scan(step, first, (scenario.transition, scenario.process_noise, increments))
-    return jnp.concatenate([P0[None], later])
+    inputs = (scenario.transition, scenario.process_noise, window.flat(increments))
+    return jnp.concatenate(
+        [jnp.asarray(scenario.prior.covariance)[None], jax.lax.scan(step, window.first(), inputs)[1]]
+    )
+
+
+def covariance_deviations(
+    scenario: Scenario,
+    increments: Float[Array, "steps window space window space"],
+    changes: Float[Array, "groups steps window space window space"],
+) -> Float[Array, "groups times state state"]:
+    """First-order changes of :func:`covariance_recursion` for several changes of the increments.
+
+    From ``dS <- T dS T'`` and ``d (S^-1 + D)^-1 = K dS K' - S+ dD S+`` with ``K = S+ S^-1 = I - S+ D``: all groups
+    share the matrices, so that each step is four matrix products.
+    """
+    n = scenario.motion.state_size
+    window = _Window(scenario, increments.shape[1])
+    groups = len(changes)
+
+    def step(carry, inputs):
+        S, dS = carry
+        F, Q, D, dD = inputs
+        S = window.update(window.predict(S, F, Q), D)
+        L = S[:, window.observed]
+        M = (jnp.eye(window.size).at[:, window.observed].add(-L @ D)) @ window.shift(F)
+        dS = jnp.einsum("ab,gbc,dc->gad", M, dS, M) - jnp.einsum("ab,gbc,dc->gad", L, dD, L)
+        return (S, dS), dS[:, :n, :n]
+
+    inputs = (
+        scenario.transition,
+        scenario.process_noise,
+        window.flat(increments),
+        jnp.moveaxis(window.flat(changes), 0, 1),
+    )
+    first = (window.first(), jnp.zeros((groups, window.size, window.size)))
+    _, later = jax.lax.scan(step, first, inputs)
+    return jnp.concatenate([jnp.zeros((groups, 1, n, n)), jnp.moveaxis(later, 0, 1)], axis=1)
+
+
+class _Window:
+    """The last states as one vector [x_k, position at age 1, ..., position at age W-1] and its covariance."""
+
+    def __init__(self, scenario: Scenario, ages: int):
+        n, d = scenario.motion.state_size, scenario.dim
+        position = np.array(scenario.motion.position_index)
+        self.n, self.size = n, n + d * (ages - 1)
+        self.prior = scenario.prior.covariance
+        self.observed = np.concatenate([position, np.arange(n, self.size)])
+        self.age = np.zeros((self.size, self.size))  # ages move on by one; age 1 is taken from the state
+        if ages > 1:
+            self.age[n + np.arange(d), position] = 1.0
+        self.age[np.arange(n + d, self.size), np.arange(n, self.size - d)] = 1.0
+
+    def first(self) -> Float[Array, "size size"]:
+        return jnp.zeros((self.size, self.size)).at[: self.n, : self.n].set(self.prior)
+
+    def flat(self, D: Float[Array, "*n w d w d"]) -> Float[Array, "*n observed observed"]:
+        return D.reshape(*D.shape[:-4], len(self.observed), len(self.observed))
+
+    def shift(self, F: Float[Array, "state state"]) -> Float[Array, "size size"]:
+        corner = jnp.zeros((self.size, self.size)).at[: self.n, : self.n].set(F)
+        return corner + self.age
+
+    def predict(self, S: Array, F: Array, Q: Array) -> Float[Array, "size size"]:
+        T = self.shift(F)
+        return jnp.asarray(T @ S @ T.T).at[: self.n, : self.n].add(Q)
+
+    def update(self, S: Array, D: Array) -> Float[Array, "size size"]:
+        cross = S[:, self.observed]
+        gain = jnp.linalg.solve(jnp.eye(len(self.observed)) + D @ cross[self.observed], D @ cross.T)
+        return symmetrize(S - cross @ gain)

@@ -5,12 +5,14 @@ Write ``s_n(r)`` for the location score of the noise at step n in mode r and
 ``sum_m C_m(n, n'; k) E[grad h_m(x_n) grad h_m(x_n')^T]`` with ``C(n, n'; k) = E[a(n, k) a(n', k)]``.
 
 For fixed n, ``a(n, k)`` is a martingale in k, so that C grows by the covariance of its increments. With the filtered
-law ``p_k(r) = Pr(r_k = r | w_{1:k})``, ``A_n(r) = E[s_n | w_{1:k-1}, r_{k-1} = r]`` centred under ``p_{k-1}``, and
-``q(r) = Pr(r_{k-1} = r | w_{1:k})``, one new measurement adds
+law ``p_k(r) = Pr(r_k = r | w_{1:k})``, ``q(r) = Pr(r_{k-1} = r | w_{1:k})`` and the differences between modes
+``d_n(r) = E[s_n | w_{1:k-1}, r_{k-1} = r] - E[s_n | w_{1:k-1}, r_{k-1} = 0]``, one new measurement adds
 
-* between older steps n, n': ``E[xi_n xi_n']`` with ``xi_n = sum_r q(r) A_n(r)``, positive semidefinite draw by draw;
+* between older steps n, n': ``E[xi_n xi_n']`` with ``xi_n = sum_r (q(r) - p_{k-1}(r)) d_n(r)``, positive semidefinite
+  draw by draw;
 * at (k, k), by Louis' identity: the known-mode information minus ``E[Var(s_k | w_{1:k})]``;
-* at (n, k), likewise: ``-E[Cov(s_n, s_k | w_{1:k})]``.
+* at (n, k), likewise: ``-E[Cov(s_n, s_k | w_{1:k})]``, that is ``-E[sum_r c(r) d_n(r)]`` with
+  ``c(r) = E[s_k ; r_{k-1} = r | w_{1:k}] - a(k, k) q(r)``.
 
 The last two replace products of scores, whose noise does not vanish when the modes are certain. No mode sequence is
 enumerated; all entries decay with the lag as fast as the chain forgets, which is what the window uses.
@@ -94,29 +96,30 @@ def score_covariance_increments(
         return x.reshape(groups, paths, *x.shape[1:]).mean(1)
 
     def step(carry, inputs):
-        p, A = carry  # [n, modes], [n, modes, window]: A[., r, i] = E[s at age i | w_{1:k-1}, r_{k-1} = r]
+        p, d = carry  # [n, modes], [n, modes-1, window]: d[., r, i] at age i, given r_{k-1} = r + 1
         T, log_l, s, known = inputs
         predicted = p @ T
         l = jnp.exp(log_l - jnp.max(jnp.where(predicted > 0, log_l, -jnp.inf), -1, keepdims=True))
         joint = p[:, :, None] * T * jnp.where(predicted > 0, l, 0.0)[:, None, :]
         joint = joint / joint.sum((1, 2), keepdims=True)
         p_new, q = joint.sum(1), joint.sum(2)
+        s_with = jnp.sum(joint * s[:, None, :], -1)  # E[s_k ; r_{k-1} = r | w_{1:k}]
+        a = s_with.sum(-1)
 
-        centred = A - jnp.sum(p[:, :, None] * A, 1, keepdims=True)
-        xi = jnp.sum(q[:, :, None] * centred, 1)
-        a = jnp.sum(p_new * s, -1)
+        older = d[:, :, :-1]
         newest = known - mean(jnp.sum(p_new * s**2, -1) - a**2)
-        s_given_old = jnp.sum(joint * s[:, None, :], -1)  # E[s_k ; r_{k-1} = r | w_{1:k}]
-        cross = -mean(jnp.sum(s_given_old[:, :, None] * centred, 1) - xi * a[:, None])[:, :-1]
-        ages = xi[:, :-1].reshape(groups, paths, window - 1)
-        old = jnp.einsum("gni,gnj->gij", ages, ages) / paths
+        c = s_with - a[:, None] * q
+        cross = -mean(jnp.sum(c[:, 1:, None] * older, 1))
+        xi = jnp.sum((q - p)[:, 1:, None] * older, 1).reshape(groups, paths, window - 1)
+        old = jnp.einsum("gni,gnj->gij", xi, xi) / paths
         top = jnp.concatenate([newest[:, None, None], cross[:, None, :]], -1)
         increment = jnp.concatenate([top, jnp.concatenate([cross[:, :, None], old], -1)], -2)
 
-        backward = joint / jnp.where(p_new > 0, p_new, 1.0)[:, None, :]
-        kept = sum(backward[:, r, :, None] * A[:, r, None, :-1] for r in range(modes))
-        return (p_new, jnp.concatenate([s[:, :, None], kept], -1)), increment
+        backward = joint / jnp.where(p_new > 0, p_new, 1.0)[:, None, :]  # Pr(r_{k-1} | r_k, w_{1:k})
+        apart = backward[:, 1:, 1:] - backward[:, 1:, :1]
+        kept = sum((apart[:, r, :, None] * older[:, r, None] for r in range(modes - 1)), jnp.zeros(()))
+        return (p_new, jnp.concatenate([(s[:, 1:] - s[:, :1])[:, :, None], kept], -1)), increment
 
-    first = (jnp.broadcast_to(jnp.asarray(process.start), (n, modes)), jnp.zeros((n, modes, window)))
+    first = (jnp.broadcast_to(jnp.asarray(process.start), (n, modes)), jnp.zeros((n, modes - 1, window)))
     _, increments = jax.lax.scan(step, first, (process.transitions, log_l, s, known))
     return jnp.moveaxis(increments, 0, 1)

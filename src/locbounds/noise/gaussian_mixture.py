@@ -42,6 +42,9 @@ class GaussianMixture(Noise):
     means: Float[Array, " c"] = eqx.field(converter=float64)
     stds: Float[Array, " c"] = eqx.field(converter=float64)
 
+    def __init__(self, weights, means, stds):
+        self.weights, self.means, self.stds = weights, means, stds
+
     def __check_init__(self):
         if traced(self.weights, self.means, self.stds):
             return

@@ -1,0 +1,99 @@
+"""``locbounds fit``: a log of ranges becomes a scenario."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from locbounds.cli.log_options import (
+    AnchorsOption,
+    ColumnsOption,
+    HoldOutOption,
+    LabelsOption,
+    SelectOption,
+    TimeOffsetOption,
+    TruthOption,
+    read,
+)
+from locbounds.cli.options import ForceOption, JsonOption, OutOption, default_out
+from locbounds.cli.output import output_folder, print_json, print_table, status
+
+
+def fit(
+    ranges: Annotated[Path, typer.Argument(metavar="RANGES.csv", help="Measured ranges.", show_default=False)],
+    anchors: AnchorsOption = None,
+    truth: TruthOption = None,
+    select: SelectOption = None,
+    hold_out: HoldOutOption = None,
+    time_offset: TimeOffsetOption = 0.0,
+    labels: LabelsOption = None,
+    columns: ColumnsOption = None,
+    per_anchor: Annotated[bool, typer.Option("--per-anchor", help="Noise and dwell times for every anchor.")] = False,
+    psd: Annotated[
+        float | None,
+        typer.Option("--psd", metavar="M2_S3", help="Acceleration intensity, if the truth cannot tell it."),
+    ] = None,
+    out: OutOption = None,
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> None:
+    """Fit noise, sight, motion and prior to a log of real ranges; write a scenario that track runs as it is.
+
+    Writes scenario.toml (its comments say where every number came from), quality.csv, autocorrelation.csv and
+    quality.png.
+
+    [bold]Example[/bold]: locbounds fit ranges.csv --anchors anchors.csv --truth truth.csv --select scene=canteen
+    --hold-out 4
+    """
+    from locbounds.fit import fit_scenario, quality_figure
+    from locbounds.fit.quality import PROBABILITIES
+    from locbounds.io.scenario_file import dumps
+    from locbounds.report.tables import csv_text
+
+    with output_folder(default_out(ranges.name.split(".")[0], out), force=force) as folder:
+        with status("reading") as say:
+            log = read(ranges, anchors, truth, select, time_offset, columns, labels)
+            kept, held = log.hold_out(hold_out) if hold_out is not None else (log, None)
+            say(f"fitting {kept.ranges:,} ranges of {len(kept.tracks)} tracks")
+            title = f"Fitted to {ranges.name}" + (f", {select}" if select else "")
+            fitted = fit_scenario(kept, held_out=held, per_anchor=per_anchor, psd_m2_s3=psd, title=title)
+        quality = fitted.quality
+        folder.write_text("scenario.toml", dumps(fitted.scenario, fitted.comments))
+        quantiles = [f"{kind}_q{100 * p:02.0f}_m" for p in PROBABILITIES for kind in ("measured", "fitted")]
+        rows = [
+            (q.name, q.ranges, q.mean_m, q.fitted_mean_m, q.std_m, q.fitted_std_m, q.nlos_share, q.ks)
+            + tuple(x for pair in zip(q.quantiles_m, q.fitted_quantiles_m, strict=True) for x in pair)
+            for q in quality.links
+        ]
+        columns_out = ("anchor", "ranges", "mean_m", "fitted_mean_m", "std_m", "fitted_std_m", "nlos_share", "ks")
+        folder.write_text("quality.csv", csv_text((*columns_out, *quantiles), rows))
+        lags = list(
+            zip(
+                quality.lags,
+                quality.error_autocorrelation,
+                quality.model_autocorrelation,
+                quality.residual_autocorrelation,
+                strict=True,
+            )
+        )
+        folder.write_text("autocorrelation.csv", csv_text(("lag_steps", "errors", "fitted_chain", "residuals"), lags))
+        figure = quality_figure(kept, fitted.noise, quality)
+        folder.write("quality.png", lambda path: figure.savefig(path, dpi=150))
+    if json:
+        print_json({"comments": fitted.comments, "notes": fitted.notes, "links": rows, "autocorrelation": lags})
+        return
+    print_table("Where the numbers came from", ("key", "source"), list(fitted.comments.items()))
+    print_table(
+        "Errors per link, measured and fitted",
+        ("anchor", "ranges", "mean m", "fitted", "std m", "fitted", "NLOS share", "KS distance"),
+        [tuple(round(x, 3) if isinstance(x, float) else x for x in row[:8]) for row in rows],
+    )
+    print_table(
+        "Autocorrelation of the errors",
+        ("lag in steps", "errors", "explained by the chain", "left in the residuals"),
+        [tuple(round(x, 3) if isinstance(x, float) else x for x in row) for row in lags],
+    )
+    for note in fitted.notes:
+        typer.echo(note)
+    typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")
+    typer.echo(f"next: locbounds track {folder.path / 'scenario.toml'}")

@@ -1,0 +1,62 @@
+"""Options of the commands that read a log of ranges."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from locbounds.errors import InputError
+
+if TYPE_CHECKING:
+    from locbounds.fit import RangeLog
+
+RangesOption = Annotated[
+    Path | None, typer.Option("--ranges", metavar="CSV", help="Measured ranges (.csv or .csv.gz).")
+]
+AnchorsOption = Annotated[Path | None, typer.Option("--anchors", metavar="CSV", help="Anchor positions.")]
+TruthOption = Annotated[Path | None, typer.Option("--truth", metavar="CSV", help="True positions.")]
+SelectOption = Annotated[
+    str | None, typer.Option("--select", metavar="COLUMN=VALUE", help="Only these rows, e.g. scene=canteen.")
+]
+HoldOutOption = Annotated[
+    str | None,
+    typer.Option("--hold-out", metavar="TRACKS", help="Tracks kept from the fit: names, or a number (the last ones)."),
+]
+TimeOffsetOption = Annotated[
+    float, typer.Option("--time-offset", metavar="S", help="Seconds added to the times of the ranges.")
+]
+LabelsOption = Annotated[
+    str | None, typer.Option("--labels", metavar="COLUMN", help="Column of the ranges that says los or nlos.")
+]
+ColumnsOption = Annotated[
+    list[str] | None,
+    typer.Option("--column", metavar="FILE.KEY=NAME", help="Own column names, e.g. ranges.range=dist; repeatable."),
+]
+
+
+def read(
+    ranges: Path | None,
+    anchors: Path | None,
+    truth: Path | None,
+    select: str | None,
+    time_offset: float,
+    columns: list[str] | None,
+    labels: str | None,
+) -> "RangeLog":
+    """The log that these options describe; an InputError names the file that is missing."""
+    from locbounds.io.logs import LogColumns, read_log
+
+    missing = [
+        name for name, path in (("--ranges", ranges), ("--anchors", anchors), ("--truth", truth)) if path is None
+    ]
+    if ranges is None or anchors is None or truth is None:
+        raise InputError(f"a log needs three files: {', '.join(missing)} missing", "Give ranges, anchors and truth")
+    return read_log(
+        ranges,
+        anchors=anchors,
+        truth=truth,
+        columns=LogColumns.parse(columns or []),
+        select=select,
+        time_offset_s=time_offset,
+        labels=labels,
+    )

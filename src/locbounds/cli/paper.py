@@ -1,0 +1,56 @@
+"""``locbounds paper``: a published study, published beside computed."""
+
+from typing import Annotated
+
+import typer
+
+from locbounds.cli.options import ForceOption, JsonOption, OutOption, SeedOption, default_out
+from locbounds.cli.output import output_folder, print_json, print_table, status
+from locbounds.cli.paper_names import paper as find_paper
+
+
+def paper(
+    name: Annotated[str, typer.Argument(metavar="PAPER", help="fritsche2013", show_default=False)],
+    samples: Annotated[
+        int | None,
+        typer.Option("--samples", min=1, help="Draws of every bound; by default until the s.e. is below 0.1 %."),
+    ] = None,
+    runs: Annotated[int, typer.Option("--runs", min=2, help="Tracks for every filter.")] = 20_000,
+    seed: SeedOption = 0,
+    out: OutOption = None,
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> None:
+    """Reproduce a paper: its tables and figures, published beside computed with standard errors.
+
+    Writes table1.csv, fig1.csv and fig1.png for fritsche2013. The table on the screen compares every published entry
+    with the computed one.
+
+    [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
+    """
+    study = find_paper(name)
+    with output_folder(default_out(name, out), force=force) as folder:
+        with status(f"{name}: starting") as say:
+            columns = list(study.study(samples=samples, runs=runs, seed=seed, announce=say))
+        cells = study.table1(columns)
+        folder.write_text("table1.csv", study.table1_csv(columns))
+        folder.write_text("fig1.csv", study.fig1_csv(columns))
+        figure = study.fig1(columns)
+        folder.write("fig1.png", lambda path: figure.savefig(path, dpi=150))
+    if json:
+        print_json({"table1": [cell._asdict() for cell in cells], "remarks": study.REMARKS})
+        return
+    stays = list(dict.fromkeys(cell.stay for cell in cells))
+    rows = []
+    for method in dict.fromkeys(cell.method for cell in cells):
+        row = {cell.stay: cell for cell in cells if cell.method == method}
+        rows.append([method, "published", *(f"{row[s].published_m:.1f}" for s in stays)])
+        rows.append(["", "computed", *(f"{row[s].computed_m:.2f} ± {row[s].stderr_m:.2f}" for s in stays)])
+    print_table(
+        "Table I: position RMSE in m, averaged over steps 0..100 (± one standard error), by stay probability",
+        ["method", "", *(f"{s:g}" for s in stays)],
+        rows,
+    )
+    for remark in study.REMARKS:
+        typer.echo(remark)
+    typer.echo(f"\nwrote {', '.join(str(path) for path in folder.written)}")

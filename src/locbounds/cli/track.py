@@ -1,0 +1,199 @@
+"""``locbounds track``: bounds and filters over time, on a model or along measured tracks."""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from locbounds.cli.log_options import (
+    AnchorsOption,
+    ColumnsOption,
+    HoldOutOption,
+    RangesOption,
+    SelectOption,
+    TimeOffsetOption,
+    TruthOption,
+    read,
+)
+from locbounds.cli.options import ForceOption, JsonOption, OutOption, ScenarioArgument, SeedOption, default_out
+from locbounds.cli.output import count_progress, output_folder, precision_progress, print_json, print_table, status
+
+if TYPE_CHECKING:
+    from locbounds.registry import Method
+    from locbounds.result import Result
+    from locbounds.scenario import Scenario
+
+JOINT_ANCHORS = 6  # up to here the IMM over all joint modes is the default filter, beyond it the factorised one
+BIN_S = 10.0  # width of the time bins for errors pooled over measured tracks
+
+
+def track(
+    scenario: ScenarioArgument,
+    bounds: Annotated[
+        str | None, typer.Option("--bounds", metavar="IDS", help="Bounds, comma separated; by default all that apply.")
+    ] = None,
+    filters: Annotated[
+        str | None, typer.Option("--filters", metavar="IDS", help="Filters, comma separated, or none.")
+    ] = None,
+    rtol: Annotated[
+        float | None, typer.Option("--rtol", help="Relative standard error to reach at every step; default 1e-3.")
+    ] = None,
+    runs: Annotated[int, typer.Option("--runs", min=2, help="Simulated tracks for every filter.")] = 1_000,
+    seed: SeedOption = 0,
+    ranges: RangesOption = None,
+    anchors: AnchorsOption = None,
+    truth: TruthOption = None,
+    select: SelectOption = None,
+    hold_out: HoldOutOption = None,
+    time_offset: TimeOffsetOption = 0.0,
+    columns: ColumnsOption = None,
+    out: OutOption = None,
+    json: JsonOption = False,
+    force: ForceOption = False,
+) -> None:
+    """Bounds on the tracking error over time, and what filters reach.
+
+    Writes rmse.csv, run.nc and rmse.png. With a log of real ranges (--ranges, --anchors, --truth) the filters run on
+    the measured ranges instead of simulated ones and the bound is computed along the measured tracks.
+
+    [bold]Example[/bold]: locbounds track scenario.toml --bounds bcrb,enumer --filters imm-ekf --rtol 1e-3
+    """
+    from locbounds.io.scenario_file import load
+
+    model = load(scenario)
+    chosen_bounds = _bounds(model, bounds)
+    chosen_filters = _filters(model, filters)
+    with output_folder(default_out(scenario, out), force=force) as folder:
+        if ranges is not None or anchors is not None or truth is not None:
+            log = read(ranges, anchors, truth, select, time_offset, columns, None)
+            _along_log(model, log, hold_out, chosen_bounds, chosen_filters, rtol, seed, folder, json)
+        else:
+            _on_model(model, chosen_bounds, chosen_filters, rtol, runs, seed, folder, json)
+
+
+def _bounds(model: "Scenario", ids: str | None) -> "list[Method]":
+    from locbounds.registry import METHODS, method
+    from locbounds.verdict import Status
+
+    if ids is not None:
+        return [] if ids == "none" else [method(id.strip(), "bound") for id in ids.split(",")]
+    applicable = [m for m in METHODS.values() if m.kind == "bound"]
+    applicable = [m for m in applicable if m.verdict(model).status is not Status.REFUSED]
+    known = any(m.id == "known-sight" for m in applicable)  # then nothing is left to average over
+    return [m for m in applicable if not (known and m.id in ("bcrb", "enumer"))]
+
+
+def _filters(model: "Scenario", ids: str | None) -> list[Any]:
+    from locbounds import registry
+
+    if ids is None:
+        ids = f"{'imm-ekf' if len(model.links) <= JOINT_ANCHORS else 'imm-ekf-factorised'},imm-kf"
+    return [] if ids == "none" else [registry.load(registry.method(id.strip(), "filter"))() for id in ids.split(",")]
+
+
+def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
+    from locbounds import registry
+    from locbounds.evaluation import evaluate_on, quantile
+    from locbounds.result import format_with_error, tightest
+    from locbounds.simulation import simulate
+
+    results: list[Result] = []
+    try:
+        for entry in bounds:
+            with precision_progress(entry.name) as progress:
+                results.append(registry.load(entry)(model, rtol=rtol, seed=seed, progress=progress))
+        if filters:
+            with status(f"drawing {runs:,} tracks"):
+                draws = simulate(model, runs=runs, seed=seed)
+        for filter in filters:
+            with count_progress(filter.name) as progress:
+                results.append(evaluate_on(filter, model, draws, seed=seed, progress=progress))
+    except KeyboardInterrupt:
+        _save(results, model, folder)
+        raise
+    _save(results, model, folder)
+    best = tightest(results)
+
+    rows = []
+    for r in results:
+        efficient, tails = "", ""
+        if r.kind == "filter":
+            matching = [b for b in best if r.sees <= b.sees]
+            efficient = str(r.efficiency(matching[0])) if matching else ""
+            tails = " / ".join(f"{quantile(r, share)[0]:.3g}" for share in (0.67, 0.95))
+        number = format_with_error(r.mean_position_rmse(), r.mean_position_rmse_stderr())
+        rows.append([r.id, r.kind, number, efficient, tails, "; ".join([str(r.verdict.status), *r.verdict.reasons])])
+    if json:
+        keys = ("method", "kind", "position_rmse_m", "stderr_m", "verdict")
+        values = [
+            (r.id, r.kind, float(r.mean_position_rmse()), r.mean_position_rmse_stderr(), str(r.verdict))
+            for r in results
+        ]
+        print_json([dict(zip(keys, value, strict=True)) for value in values])
+        return
+    print_table(
+        f"Position RMSE, mean over steps 0..{model.steps} (± one standard error)",
+        ["method", "kind", "RMSE", "efficiency [95 %]", "67 % / 95 % in m", "verdict"],
+        rows,
+    )
+    if len(best) == 1:
+        typer.echo(f"tightest valid bound for a filter that sees the ranges only: {best[0].id}")
+    elif best:
+        names = " and ".join(b.id for b in best)
+        typer.echo(f"tightest valid bounds: {names}, equal within four standard errors")
+    for warning in dict.fromkeys(w for r in results for w in r.verdict.warnings):
+        typer.echo(f"warning: {warning}")
+    typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")
+
+
+def _save(results, model, folder) -> None:
+    """Files of what was computed, after Ctrl-C too."""
+    from locbounds.report import dataset, plot, tables
+
+    if results:
+        folder.write_text("rmse.csv", tables.csv_text(tables.RMSE_COLUMNS, tables.rmse_rows(results)))
+        folder.write("run.nc", lambda path: dataset.save(results, path))
+        folder.write("rmse.png", lambda path: plot.rmse(results, title=model.title).savefig(path, dpi=150))
+
+
+def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) -> None:
+    from locbounds import registry
+    from locbounds.fit.held_out import EXPLANATION, along_tracks
+    from locbounds.report import tables, track_plot
+
+    if hold_out is not None:
+        _, log = log.hold_out(hold_out)
+    bounds = [entry for entry in bounds if entry.id != "los-only"] or bounds
+    with status("reading") as say:
+        results = along_tracks(
+            model,
+            log,
+            bounds=[registry.load(entry) for entry in bounds],
+            filters=filters,
+            rtol=rtol,
+            seed=seed,
+            announce=say,
+        )
+    pooled = [(r.id, r.kind, *row) for r in results for row in r.over_time(BIN_S)]
+    folder.write_text("rmse.csv", tables.csv_text(tables.RMSE_COLUMNS, pooled))
+    by_track = [
+        (r.id, r.kind, name, value) for r in results for name, value in zip(r.tracks, r.rmse_by_track(), strict=True)
+    ]
+    folder.write_text("tracks.csv", tables.csv_text(("method", "kind", "track", "position_rmse_m"), by_track))
+    folder.write("rmse.png", lambda path: track_plot.along_tracks(results, width_s=BIN_S).savefig(path, dpi=150))
+    if json:
+        print_json(
+            [{"method": r.id, "kind": r.kind, "position_rmse_m": r.rmse()[0], "stderr_m": r.rmse()[1]} for r in results]
+        )
+        return
+    rows = []
+    for r in results:
+        value, error = r.rmse()
+        tails = f"{r.quantile(0.5):.2f} / {r.quantile(0.95):.2f}" if r.kind == "filter" else ""
+        rows.append([r.id, r.kind, f"{value:.3f} m" + (f" ± {error:.3f}" if error > 0 else ""), tails])
+    print_table(
+        f"Position RMSE over {len(log.tracks)} measured tracks, steps 1..K (± one standard error over tracks)",
+        ["method", "kind", "RMSE", "50 % / 95 % in m"],
+        rows,
+    )
+    typer.echo(EXPLANATION)
+    typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")

@@ -1,0 +1,24 @@
+"""Noise, sight and motion models from logs of real ranges."""
+
+from locbounds.fit.motion import MotionFit, fit_psd, prior_from_tracks
+from locbounds.fit.quality import FitQuality, LinkQuality, fit_quality, quality_figure
+from locbounds.fit.range_log import ErrorSequences, RangeLog, Track
+from locbounds.fit.scenario import FittedScenario, fit_scenario
+from locbounds.fit.sight_noise import SightNoiseFit, fit_sight_noise
+
+__all__ = [
+    "ErrorSequences",
+    "FitQuality",
+    "FittedScenario",
+    "LinkQuality",
+    "MotionFit",
+    "RangeLog",
+    "SightNoiseFit",
+    "Track",
+    "fit_psd",
+    "fit_quality",
+    "fit_scenario",
+    "fit_sight_noise",
+    "prior_from_tracks",
+    "quality_figure",
+]

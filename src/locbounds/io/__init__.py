@@ -1,0 +1,1 @@
+"""Files: scenarios, anchor tables, and writing results so that nothing is ever left half-written."""

@@ -1,0 +1,88 @@
+"""Tables of anchors."""
+
+import csv
+import math
+import os
+from pathlib import Path
+
+from locbounds.errors import InputError
+from locbounds.io.complain import DEGREES_REMEDY, close_key, is_degrees
+
+COLUMNS = ("anchor_id", "x_m", "y_m", "z_m")
+
+
+def read_anchors(path: str | os.PathLike, *, columns: tuple[str, ...] = COLUMNS) -> dict[str, tuple[float, ...]]:
+    r"""Positions of anchors from a CSV file.
+
+    Parameters
+    ----------
+    path
+        With a header line; other columns are ignored.
+    columns
+        Names of the columns with the anchor's name and its coordinates in metres; the last one may be absent (2-D).
+
+    Returns
+    -------
+    dict
+        Name -> 2 or 3 coordinates in metres, in the file's order.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column is missing, a cell is not a finite number, or a name repeats.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> path = Path(tempfile.mkdtemp()) / "anchors.csv"
+    >>> _ = path.write_text("anchor_id,x_m,y_m\nbs1,-3000,-2000\n")
+    >>> read_anchors(path)
+    {'bs1': (-3000.0, -2000.0)}
+    """
+    path = Path(path)
+    try:
+        rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"cannot read the anchors from {path}: {reason.lower()}", "Give a CSV file") from error
+    header = [name.strip() for name in rows[0]] if rows else []
+    used = [name for name in columns if name in header]
+    for name in columns[:3]:
+        if name not in header:
+            raise InputError(
+                f"{path} has no column {name}, but {', '.join(header) or 'nothing'}", _remedy(name, header)
+            )
+    anchors: dict[str, tuple[float, ...]] = {}
+    for line, row in enumerate(rows[1:], start=2):
+        if not any(cell.strip() for cell in row):
+            continue
+        cells = dict(zip(header, (cell.strip() for cell in row), strict=False))
+        name = cells.get(columns[0], "")
+        if not name or name in anchors:
+            raise InputError(
+                f"{path}, line {line}: the name {name!r} is {'given twice' if name else 'empty'}",
+                "Give every anchor its own name",
+            )
+        anchors[name] = tuple(_metres(cells.get(column, ""), f"{path}, line {line}, {column}") for column in used[1:])
+    if not anchors:
+        raise InputError(f"{path} has no anchors", "Add a line per anchor below the header")
+    return anchors
+
+
+def _metres(cell: str, where: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{where} is {cell!r}", "Give a finite number of metres")
+    return value
+
+
+def _remedy(name: str, header: list[str]) -> str:
+    if any(is_degrees(column) for column in header):
+        return DEGREES_REMEDY
+    close = close_key(name, header)
+    return (
+        f"Rename the column {close} to {name}" if close else f"The columns are {', '.join(COLUMNS[:3])} and z_m in 3-D"
+    )

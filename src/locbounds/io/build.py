@@ -1,0 +1,226 @@
+"""From the validated keys of a scenario file to the scenario."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from locbounds.axes import LOS, NLOS, ndarray
+from locbounds.errors import InputError
+from locbounds.io.anchors_csv import read_anchors
+from locbounds.io.complain import quoted, unknown_key_remedy
+from locbounds.io.schema import (
+    AnchorTable,
+    LinksSection,
+    MotionSection,
+    NlosTable,
+    NoiseTable,
+    OutlierTable,
+    PriorSection,
+    ScenarioFile,
+    SightTable,
+    TimeSection,
+)
+from locbounds.measurement import Range
+from locbounds.motion import ConstantVelocity
+from locbounds.noise import Gaussian, GaussianMixture, Noise
+from locbounds.priors import GaussianPrior
+from locbounds.scenario import Link, Scenario
+from locbounds.sight import DwellSight, KnownSight, MarkovSight, Sight
+from locbounds.sight.markov import EQUAL_STEPS
+from locbounds.times import Times
+
+LETTERS = {"L": LOS, "N": NLOS}
+WORDS = {"los": LOS, "nlos": NLOS}
+
+
+@contextmanager
+def at(path: str) -> Iterator[None]:
+    """Put a key's path in front of the errors of the model pieces."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{path}: {error.cause}", error.remedy) from error
+
+
+def build_times(time: TimeSection) -> Times:
+    """Times of the steps."""
+    with at("time"):
+        if time.times_s is not None:
+            return Times(time.times_s)
+        assert time.step_s is not None
+        assert time.steps is not None
+        return Times.uniform(step_s=time.step_s, steps=time.steps)
+
+
+def build_motion(motion: MotionSection, dim: int) -> ConstantVelocity:
+    """Motion model in as many dimensions as the prior."""
+    discrete = motion.model == "constant-velocity-discrete"
+    name = "acceleration_var_m2_s4" if discrete else "psd_m2_s3"
+    intensity = getattr(motion, name)
+    if isinstance(intensity, tuple) and len(intensity) != dim:
+        raise InputError(
+            f"motion.{name} has {len(intensity)} numbers, prior.position_m {dim} coordinates",
+            "Give one number, or one per coordinate",
+        )
+    with at("motion"):
+        return ConstantVelocity(intensity, dim, discrete=discrete)
+
+
+def _covariance(spread, dim: int) -> ndarray:
+    if np.ndim(spread) == 2:
+        return np.asarray(spread)
+    return np.diag(np.broadcast_to(np.asarray(spread), dim) ** 2)
+
+
+def build_prior(prior: PriorSection) -> GaussianPrior:
+    """Prior of position and velocity."""
+    n = len(prior.position_m)
+    covariance = np.zeros((2 * n, 2 * n))
+    if prior.covariance is not None:
+        covariance[:] = prior.covariance
+    else:
+        for name, block in (("position_std_m", slice(0, n)), ("velocity_std_m_s", slice(n, None))):
+            covariance[block, block] = _covariance(getattr(prior, name), n)
+            with at(f"prior.{name}"):
+                GaussianPrior(np.zeros(n), covariance[block, block])
+    with at("prior"):
+        return GaussianPrior([*prior.position_m, *prior.velocity_m_s], covariance)
+
+
+def build_schedule(known, times: Times) -> list[int]:
+    """Modes of steps 1..K from letters, or from a list of periods."""
+    remedy = SightTable.model_fields["known"].description or ""
+    if isinstance(known, str):
+        if not known or set(known) - set(LETTERS):
+            raise InputError(f"the schedule is {quoted(known)}", f"Use the letters L and N only; {remedy}")
+        return [LETTERS[letter] for letter in known]
+    if not isinstance(known, list) or not known or not all(isinstance(period, dict) for period in known):
+        raise InputError(f"the schedule is {quoted(known)}", remedy)
+    modes = np.full(times.steps, -1)
+    begin = -np.inf
+    for period in known:
+        for name in set(period) - {"until_s", "sight"}:
+            raise InputError(f"unknown key {name} in {period}", unknown_key_remedy(name, ["until_s", "sight"]))
+        until, sight = period.get("until_s", np.inf), period.get("sight")
+        if sight not in WORDS or isinstance(until, bool | str) or not until > begin:
+            raise InputError(f"the period {period} after {begin:g} s is not valid", f"Give growing times; {remedy}")
+        modes[(times.time_s[1:] > begin) & (times.time_s[1:] <= until)] = WORDS[sight]
+        begin = until
+    if (modes < 0).any():
+        raise InputError(
+            f"the schedule ends at {begin:g} s, the scenario at {times.time_s[-1]:g} s",
+            'End with a period without until_s, for example { sight = "los" }',
+        )
+    return modes.tolist()
+
+
+def build_sight(sight: SightTable, times: Times) -> Sight:
+    """Chain of sight conditions, checked against the times."""
+    if sight.known is not None:
+        chain = KnownSight(build_schedule(sight.known, times))
+    elif sight.dwell_s is not None:
+        chain = DwellSight(sight.start, sight.dwell_s)
+    elif sight.stay is not None:
+        chain = MarkovSight.stay(sight.stay, sight.start)
+    else:
+        chain = MarkovSight(sight.start, sight.transition)
+    if isinstance(chain, KnownSight) and len(chain.modes) != times.steps:
+        raise InputError(f"the schedule has {len(chain.modes)} letters for {times.steps} steps", "Give one per step")
+    if isinstance(chain, MarkovSight) and np.ptp(times.intervals) > EQUAL_STEPS * np.max(times.intervals):
+        chain.transitions(times.intervals)  # raises: a chain per step needs equal steps
+    return chain
+
+
+def _mixture(noise: NoiseTable) -> tuple[ndarray, ndarray, ndarray]:
+    if noise.weights is not None:
+        return np.asarray(noise.weights), np.asarray(noise.means_m), np.asarray(noise.stds_m)
+    return np.ones(1), np.array([noise.mean_m or 0.0]), np.array([noise.std_m])
+
+
+def build_noises(los: NoiseTable, nlos: NlosTable, outlier: OutlierTable | None) -> tuple[Noise, Noise]:
+    """Noises of LOS and NLOS; an excess on top of LOS is the sum of two independent errors."""
+    shape_los, shape_nlos = _mixture(los), _mixture(nlos)
+    mixed = [los.weights is not None, nlos.weights is not None]
+    if nlos.plus_los:
+        shape_nlos = _sum(shape_los, shape_nlos)
+        mixed[NLOS] = any(mixed)
+    return _noise(*shape_los, outlier, mixed[LOS]), _noise(*shape_nlos, outlier, mixed[NLOS])
+
+
+def _sum(a: tuple[ndarray, ndarray, ndarray], b: tuple[ndarray, ndarray, ndarray]) -> tuple[ndarray, ndarray, ndarray]:
+    """Mixture of the sum of two independent errors: every pair of components."""
+    (w0, m0, s0), (w1, m1, s1) = a, b
+    return np.outer(w0, w1).ravel(), np.add.outer(m0, m1).ravel(), np.sqrt(np.add.outer(s0**2, s1**2)).ravel()
+
+
+def _noise(w: ndarray, m: ndarray, s: ndarray, outlier: OutlierTable | None, mixture: bool) -> Noise:
+    if outlier is not None and outlier.share > 0:
+        w = np.append((1 - outlier.share) * w, outlier.share)
+        m, s = np.append(m, outlier.mean_m), np.append(s, outlier.std_m)
+        mixture = True
+    return GaussianMixture(w, m, s) if mixture else Gaussian(m[0], s[0])
+
+
+def _missing(steps: tuple[int, ...] | None, count: int) -> ndarray | None:
+    if steps is None:
+        return None
+    reports = np.ones(count, dtype=bool)
+    if steps and max(steps) > count:
+        raise InputError(f"step {max(steps)} is after the last step {count}", "Give steps from 1 to time.steps")
+    reports[np.array(steps, dtype=int) - 1] = False
+    return reports
+
+
+def build_link(name: str, position: tuple[float, ...], table: LinksSection, times: Times) -> Link:
+    """One link from the shared keys with the anchor's own on top."""
+    for key in ("sight", "los", "nlos"):
+        if getattr(table, key) is None:
+            raise InputError(
+                f"anchors.{name} has no {key}, and neither has [links]",
+                f"Add {key} to [links]: {LinksSection.model_fields[key].description}",
+            )
+    assert table.los is not None
+    assert table.nlos is not None
+    assert table.sight is not None
+    with at(f"anchors.{name}"):
+        measurement = Range(position)
+        reports = _missing(table.missing_steps, times.steps)
+        noises = build_noises(table.los, table.nlos, table.outlier)
+    with at(f"sight of anchor {name}"):
+        sight = build_sight(table.sight, times)
+    return Link(name, measurement, sight, noises, reports)
+
+
+def merged(shared: LinksSection, own: AnchorTable | None) -> LinksSection:
+    """The shared keys, each replaced as a whole where the anchor gives its own."""
+    if own is None:
+        return shared
+    given = {key: getattr(own, key) for key in own.model_fields_set}
+    return AnchorTable.model_construct(**{**{k: getattr(shared, k) for k in shared.model_fields_set}, **given})
+
+
+def build(file: ScenarioFile, folder: Path) -> Scenario:
+    """The scenario of a validated file; ``folder`` is where a relative ``anchors_csv`` lies."""
+    positions = {} if file.anchors_csv is None else read_anchors(folder / file.anchors_csv)
+    for name, own in file.anchors.items():
+        if own.position_m is not None:
+            positions[name] = own.position_m
+        elif name not in positions:
+            raise InputError(
+                f"anchor {name} has no position" + (f" and is not in {file.anchors_csv}" if file.anchors_csv else ""),
+                f"anchors.{name}.position_m: {AnchorTable.model_fields['position_m'].description}",
+            )
+    if not positions:
+        raise InputError("there are no anchors", "Add [anchors] with a line NAME = { position_m = [x, y] } each")
+    dim = len(file.prior.position_m)
+    for name, position in positions.items():
+        if len(position) != dim:
+            raise InputError(
+                f"anchors.{name}.position_m has {len(position)} coordinates, prior.position_m {dim}",
+                "Use the same number of coordinates everywhere",
+            )
+    times = build_times(file.time)
+    links = [build_link(n, p, merged(file.links, file.anchors.get(n)), times) for n, p in positions.items()]
+    return Scenario(file.title, times, build_motion(file.motion, dim), build_prior(file.prior), links)

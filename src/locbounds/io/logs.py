@@ -1,0 +1,354 @@
+"""Reading range logs: ranges, anchors and true positions from CSV files."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from locbounds.axes import Float, ndarray
+from locbounds.errors import InputError
+from locbounds.fit.range_log import RangeLog, Track
+from locbounds.io.csv_table import CsvTable
+
+LABELS = {"los": 0, "nlos": 1, "": -1, "unknown": -1}
+"""What a label cell may say, in upper or lower case."""
+
+DEGREES_SPREAD = 0.1
+"""Positions that differ by less than this over a whole log look like degrees."""
+
+
+@dataclass(frozen=True)
+class RangeColumns:
+    """Column names of the ranges: one line per range."""
+
+    track: str = "track_id"
+    step: str = "step"
+    time: str = "time_s"
+    anchor: str = "anchor_id"
+    range: str = "range_m"
+
+
+@dataclass(frozen=True)
+class AnchorColumns:
+    """Column names of the anchors; ``z`` is optional."""
+
+    anchor: str = "anchor_id"
+    x: str = "x_m"
+    y: str = "y_m"
+    z: str = "z_m"
+
+
+@dataclass(frozen=True)
+class TruthColumns:
+    """Column names of the true positions; ``z`` is optional, ``step`` too if the ranges have times."""
+
+    track: str = "track_id"
+    step: str = "step"
+    time: str = "time_s"
+    x: str = "x_true_m"
+    y: str = "y_true_m"
+    z: str = "z_true_m"
+
+
+@dataclass(frozen=True)
+class LogColumns:
+    """Column names of all files of a log; the defaults are those of the example data.
+
+    Examples
+    --------
+    >>> LogColumns.parse(["ranges.range=dist", "truth.time=t"]).ranges.range
+    'dist'
+    """
+
+    ranges: RangeColumns = RangeColumns()
+    anchors: AnchorColumns = AnchorColumns()
+    truth: TruthColumns = TruthColumns()
+
+    @classmethod
+    def parse(cls, options: list[str] | tuple[str, ...]) -> LogColumns:
+        """From options such as ``ranges.range=dist`` (file, key, column in the file)."""
+        columns = cls()
+        for option in options:
+            key, equals, name = option.partition("=")
+            file, dot, part = key.partition(".")
+            known = [f"{f.name}.{p.name}" for f in fields(cls) for p in fields(getattr(columns, f.name))]
+            if not (equals and dot and name) or key not in known:
+                near = difflib.get_close_matches(key, known, n=1, cutoff=0.3)
+                raise InputError(
+                    f'column mapping "{option}" is not FILE.KEY=COLUMN with a known key',
+                    f"Did you mean {near[0]}=...?" if near else f"Keys: {', '.join(known)}",
+                )
+            columns = replace(columns, **{file: replace(getattr(columns, file), **{part: name})})
+        return columns
+
+
+def read_log(
+    ranges: str | Path,
+    *,
+    anchors: str | Path,
+    truth: str | Path | None = None,
+    columns: LogColumns | None = None,
+    select: str | Mapping[str, str] | None = None,
+    time_offset_s: float = 0.0,
+    labels: str | None = None,
+    dim: int | None = None,
+) -> RangeLog:
+    """Read a log of ranges.
+
+    Parameters
+    ----------
+    ranges, anchors, truth : path
+        CSV files (also .gz).  Without a column ``track`` everything is one track.
+    columns : LogColumns
+        Column names.
+    select : str or mapping
+        ``"scene=canteen"``: only these rows, of every file that has the column; several separated by commas.
+    time_offset_s : float
+        Added to the times of the ranges before they are compared with the truth's, s.
+    labels : str, optional
+        Column of the ranges that says ``los`` or ``nlos`` (empty: unknown).
+    dim : int, optional
+        2 leaves heights out.  Default: 3 if anchors and truth have heights, 2 if neither has.
+
+    Returns
+    -------
+    RangeLog
+        If the ranges have times, these are the steps, and the true positions are interpolated to them; ranges before
+        or after the truth are left out (with a note).  Otherwise ranges and truth are joined on (track, step), and the
+        truth's rows are the steps.  Step 0 is the first of a track; its ranges are not used.
+
+    Raises
+    ------
+    InputError
+        Cells that are no numbers, times out of order or twice, unknown anchors, degrees, missing columns, empty files.
+    """
+    columns = columns or LogColumns()
+    tables = {"ranges": CsvTable(ranges, "ranges"), "anchors": CsvTable(anchors, "anchors")}
+    if truth is not None:
+        tables["truth"] = CsvTable(truth, "truth")
+    selected = _select(tables, select)
+    notes: list[str] = []
+
+    names, places = _anchors(tables["anchors"], columns.anchors, tables.get("truth"), columns.truth, dim, notes)
+    r, c = tables["ranges"], columns.ranges
+    r.need(c.anchor, "anchor")
+    r.need(c.range, "range")
+    timed = c.time in r
+    if not timed:
+        r.need(c.step, "step")
+        if truth is None:
+            raise InputError(
+                f"{r.path.name} has steps but no times, and there is no truth file to look them up",
+                f"Give the truth file, or a column {c.time} in the ranges",
+            )
+        if time_offset_s:
+            raise InputError(
+                f"a time offset of {time_offset_s:g} s was given, but {r.path.name} has no times",
+                f"Leave it out, or give a column {c.time} in the ranges",
+            )
+    frame: Any = pd.DataFrame(
+        {
+            "track": r.text(c.track) if c.track in r else "",
+            "key": r.numbers(c.time if timed else c.step) + (time_offset_s if timed else 0.0),
+            "anchor": r.text(c.anchor),
+            "range": r.numbers(c.range),
+            "sight": _labels(r, labels),
+            "line": r.lines,
+        }
+    )
+    true = _truth(tables.get("truth"), columns.truth, places.shape[1], steps=not timed, notes=notes)
+    if selected and true is not None:
+        frame = frame[frame["track"].isin(list(true))]
+        if frame.empty:
+            raise InputError(f"no range belongs to a track of {select}", "Compare the track names of both files")
+    _check_rows(frame, names, r, anchors, timed)
+    heard = set(frame["anchor"])
+    silent = [name for name in names if name not in heard]
+    if silent:
+        notes.append(f"Anchors without any range are left out: {', '.join(silent)}.")
+        places = places[[name in heard for name in names]]
+        names = [name for name in names if name in heard]
+    if len(frame) == 1:
+        raise InputError("the log has one range", "Give a log of a moving device, with many ranges per anchor")
+    tracks = []
+    for name, rows in frame.groupby("track", sort=False):
+        found = _track(str(name), rows, names, None if true is None else true.get(str(name)), timed, r, notes)
+        if found is not None:
+            tracks.append(found)
+    if not tracks:
+        raise InputError("no range has a true position", "Compare track names, steps and times of both files")
+    if labels is None:
+        tracks = [replace(track, sight=None) for track in tracks]
+    return RangeLog(tuple(names), places, tuple(tracks), tuple(notes))
+
+
+def _select(tables: Mapping[str, CsvTable], select: str | Mapping[str, str] | None) -> bool:
+    if not select:
+        return False
+    if isinstance(select, str):
+        pairs = [part.partition("=") for part in select.split(",")]
+        if not all(equals and column.strip() for column, equals, _ in pairs):
+            raise InputError(f'selection "{select}" is not COLUMN=VALUE', "For example --select scene=canteen")
+        select = {column.strip(): value.strip() for column, _, value in pairs}
+    for column, value in select.items():
+        having = [table for table in tables.values() if column in table]
+        if not having:
+            known = sorted({name for table in tables.values() for name in table.names})
+            near = difflib.get_close_matches(column, known, n=1)
+            raise InputError(
+                f"no file has a column {column} to select by",
+                f"Did you mean {near[0]}?" if near else f"The columns are {', '.join(known)}",
+            )
+        for table in having:
+            table.select(column, value)
+    return True
+
+
+def _anchors(table: CsvTable, c: AnchorColumns, truth: CsvTable | None, tc: TruthColumns, dim: int | None, notes):
+    table.need(c.anchor, "anchor")
+    table.need(c.x, "x")
+    table.need(c.y, "y")
+    heights = c.z in table, tc.z in truth if truth is not None else c.z in table
+    if dim not in (None, 2, 3):
+        raise InputError(f"dim is {dim}", "Choose 2 or 3")
+    if dim is None and heights[0] != heights[1]:
+        have, lack = ("anchors", "truth") if heights[0] else ("truth", "anchors")
+        raise InputError(
+            f"the {have} file has heights, the {lack} file has none",
+            f"Give heights in both, or dim=2 (--dim 2) if all ranges are horizontal distances; "
+            f"the {lack} column would be {tc.z if have == 'anchors' else c.z}",
+        )
+    use = (3 if all(heights) else 2) if dim is None else dim
+    if use == 3:
+        table.need(c.z, "z")
+    names = table.text(c.anchor).tolist()
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    if twice:
+        others = [n for n in table.names if n not in (c.anchor, c.x, c.y, c.z)]
+        remedy = f"Choose one with --select {others[0]}=VALUE" if others else "Give every anchor its own name"
+        raise InputError(f"anchor {twice[0]} is in {table.path.name} more than once", remedy)
+    places = table.positions((c.x, c.y, c.z)[:use])
+    _note_degrees(table, (c.x, c.y), places, notes)
+    return names, places
+
+
+def _note_degrees(table: CsvTable, columns: tuple[str, str], places: Float[ndarray, "n space"], notes) -> None:
+    x, y = places[:, 0], places[:, 1]
+    small = len(x) > 1 and np.ptp(x) < DEGREES_SPREAD and np.ptp(y) < DEGREES_SPREAD and np.ptp(places[:, :2]) > 0
+    long = all(np.mean(table.decimals(c) >= 5) > 0.5 for c in columns)
+    if small and long and np.abs(x).max() <= 180 and np.abs(y).max() <= 180:
+        notes.append(
+            f"Positions in {table.path.name} differ by less than {DEGREES_SPREAD} and have many decimals: "
+            "are they degrees? Metres are expected."
+        )
+
+
+def _truth(table: CsvTable | None, c: TruthColumns, dim: int, *, steps: bool, notes):
+    """Rows of the truth per track: time, positions and steps, checked."""
+    if table is None:
+        return None
+    for column, key in ((c.x, "x"), (c.y, "y"), (c.time, "time"), *([(c.z, "z")] if dim == 3 else [])):
+        table.need(column, key)
+    if steps:
+        table.need(c.step, "step")
+    track = table.text(c.track) if c.track in table else np.full(len(table), "", dtype=object)
+    places = table.positions((c.x, c.y, c.z)[:dim])
+    _note_degrees(table, (c.x, c.y), places, notes)
+    time = table.numbers(c.time)
+    step = table.numbers(c.step) if steps else np.arange(len(table), dtype=float)
+    found = {}
+    for name in dict.fromkeys(track.tolist()):
+        rows = np.flatnonzero(track == name)
+        t = time[rows]
+        bad = np.flatnonzero(~(np.diff(t) > 0))
+        if bad.size:
+            k = rows[bad[0] + 1]
+            what = "repeats the time before" if t[bad[0] + 1] == t[bad[0]] else "goes back in time"
+            raise InputError(
+                f"line {table.lines[k]} of {table.path.name} (track {name or 1}, {c.time} = {time[k]:g}) {what}",
+                "Sort each track by time and delete repeated times",
+            )
+        if len(np.unique(step[rows])) < len(rows):
+            raise InputError(f"track {name or 1} of {table.path.name} repeats a step", "Give every step once per track")
+        found[str(name)] = (t, places[rows], step[rows])
+    return found
+
+
+def _labels(table: CsvTable, labels: str | None) -> ndarray:
+    if labels is None:
+        return np.full(len(table), -1)
+    table.need(labels, "label")
+    text = table.text(labels, empty=True)
+    values = np.array([LABELS.get(cell.lower(), -2) for cell in text])
+    bad = np.flatnonzero(values == -2)
+    if bad.size:
+        raise InputError(
+            f'line {table.lines[bad[0]]} of {table.path.name}, column {labels}, says "{text[bad[0]]}"',
+            "Labels are los, nlos or empty",
+        )
+    return values
+
+
+def _check_rows(frame: Any, names: list[str], table: CsvTable, anchors: str | Path, timed: bool) -> None:
+    unknown = frame[~frame["anchor"].isin(names)]
+    if len(unknown):
+        row = unknown.iloc[0]
+        raise InputError(
+            f"line {row['line']} of {table.path.name} is a range to anchor {row['anchor']}, which is not in "
+            f"{Path(anchors).name}",
+            f"Add its position; the anchors there are {', '.join(names[:12])}{', ...' if len(names) > 12 else ''}",
+        )
+    twice = frame[frame.duplicated(["track", "key", "anchor"])]
+    if len(twice):
+        row = twice.iloc[0]
+        raise InputError(
+            f"line {row['line']} of {table.path.name} is a second range to anchor {row['anchor']} at the same "
+            f"{'time' if timed else 'step'} of a track",
+            "Delete one of them",
+        )
+    if timed:
+        back = frame[frame.groupby("track", sort=False)["key"].diff() < 0]
+        if len(back):
+            raise InputError(
+                f"line {back.iloc[0]['line']} of {table.path.name} goes back in time", "Sort each track by time"
+            )
+
+
+def _track(name: str, rows: Any, names: list[str], true, timed: bool, table: CsvTable, notes) -> Track | None:
+    shown = name or "1"
+    if true is None and timed:
+        key = np.unique(rows["key"].to_numpy())
+        time, places = key, None
+    elif true is None:
+        notes.append(f"Track {shown} has no true positions and is left out.")
+        return None
+    else:
+        t, x, step = true
+        if timed:
+            key = np.unique(rows["key"].to_numpy())
+            key = key[(key >= t[0]) & (key <= t[-1])]
+            time, places = key, np.stack([np.interp(key, t, column) for column in x.T], axis=1)
+        else:
+            order = np.argsort(step)
+            if (np.diff(order) < 0).any():
+                raise InputError(f"the steps of track {shown} do not increase with time", "Number them in time order")
+            key, time, places = step, t, x
+    if len(key) < 2:
+        notes.append(f"Track {shown} has fewer than two times with a true position and is left out.")
+        return None
+    at = np.searchsorted(key, rows["key"].to_numpy())
+    there = (at < len(key)) & (key[np.minimum(at, len(key) - 1)] == rows["key"].to_numpy())
+    if not there.all():
+        outside = "before or after its true positions" if timed else "at steps that the truth does not have"
+        notes.append(f"Track {shown}: {(~there).sum():,} of {len(there):,} ranges are left out, {outside}.")
+    link = pd.Categorical(rows["anchor"], categories=names).codes
+    z, sight = np.full((len(key), len(names)), np.nan), np.full((len(key), len(names)), -1)
+    z[at[there], link[there]] = rows["range"].to_numpy()[there]
+    sight[at[there], link[there]] = rows["sight"].to_numpy()[there]
+    return Track(shown, time, z[1:], places, sight[1:])

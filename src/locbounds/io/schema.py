@@ -1,0 +1,213 @@
+"""The keys of a scenario file, version 1.
+
+Every key carries its unit and one line that teaches it; the same line is the remedy in error messages and the
+comment in written files. A wrong unit is an unknown key with a suggestion.
+"""
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from locbounds.io.values import (
+    ROUNDING,
+    Chain,
+    Dwell,
+    Law,
+    Matrix,
+    Number,
+    Numbers,
+    PerAxis,
+    Point,
+    Positive,
+    Positives,
+    Probability,
+    Spread,
+    Stay,
+    Text,
+    Whole,
+    fail,
+)
+
+FORMAT = 1
+
+
+def key(description: str, default: Any = None) -> Any:
+    """An optional key."""
+    return Field(default, description=description)
+
+
+def needed(description: str) -> Any:
+    """A key that must be there."""
+    return Field(description=description)
+
+
+class Section(BaseModel):
+    """A table of the file; unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    def given(self, *names: str) -> list[str]:
+        """Which of these keys the file has."""
+        return [name for name in names if getattr(self, name) is not None]
+
+
+class TimeSection(Section):
+    """When the steps happen."""
+
+    step_s: Positive | None = key("seconds between two steps, for example step_s = 0.2")
+    steps: Whole | None = key("results at steps 0..steps; step 0 is the prior")
+    times_s: Numbers | None = key("instead of step_s and steps: times of steps 0, 1, ..., strictly increasing")
+
+    @model_validator(mode="after")
+    def _one_way(self):
+        if self.given("step_s", "steps", "times_s") not in (["step_s", "steps"], ["times_s"]):
+            raise fail(
+                f"has {', '.join(self.given('step_s', 'steps', 'times_s')) or 'no times'}",
+                "Give step_s and steps, or the list times_s",
+            )
+        return self
+
+
+class MotionSection(Section):
+    """How the mobile moves."""
+
+    model: Literal["constant-velocity", "constant-velocity-discrete"] = needed(
+        '"constant-velocity" (continuous white acceleration) or "constant-velocity-discrete" (constant during a step)'
+    )
+    psd_m2_s3: PerAxis | None = key("power spectral density of the acceleration, a number or one per axis")
+    acceleration_var_m2_s4: PerAxis | None = key("variance of the acceleration of each step, a number or one per axis")
+
+    @model_validator(mode="after")
+    def _matching_intensity(self):
+        wanted = "psd_m2_s3" if self.model == "constant-velocity" else "acceleration_var_m2_s4"
+        if self.given("psd_m2_s3", "acceleration_var_m2_s4") != [wanted]:
+            given = ", ".join(self.given("psd_m2_s3", "acceleration_var_m2_s4")) or "no intensity"
+            raise fail(f'has model = "{self.model}" with {given}', f"This model takes {wanted} and nothing else")
+        return self
+
+
+class PriorSection(Section):
+    """Where the mobile starts."""
+
+    position_m: Point = needed("mean position at step 0, for example position_m = [500, 500]; three numbers for 3-D")
+    position_std_m: Spread | None = key("a number, one per axis, or a covariance matrix in m^2")
+    velocity_m_s: Point = needed("mean velocity at step 0, for example velocity_m_s = [5, 5]")
+    velocity_std_m_s: Spread | None = key("a number, one per axis, or a covariance matrix in (m/s)^2")
+    covariance: Matrix | None = key("instead of both deviations: covariance of position and velocity, in m and m/s")
+
+    @model_validator(mode="after")
+    def _fits(self):
+        n = len(self.position_m)
+        if len(self.velocity_m_s) != n:
+            raise fail(f"has {n} position and {len(self.velocity_m_s)} velocity coordinates", "Give as many of each")
+        if self.covariance is None:
+            for name in ("position_std_m", "velocity_std_m_s"):
+                value = getattr(self, name)
+                if value is None:
+                    raise fail(f"has no {name}", f"Add {name}: {type(self).model_fields[name].description}")
+                if isinstance(value, tuple) and len(value) != n:
+                    raise fail(f"has {n} coordinates, but {name} has {len(value)}", "Give one per coordinate")
+        elif self.given("position_std_m", "velocity_std_m_s"):
+            raise fail("has both a covariance and deviations", "Keep one of them")
+        elif len(self.covariance) != 2 * n:
+            raise fail(f"has a covariance of {len(self.covariance)} rows", f"Give {2 * n}: positions, then velocities")
+        return self
+
+
+class SightTable(Section):
+    """How a link switches between LOS and NLOS."""
+
+    stay: Stay | None = key("probability of keeping the sight over one step: a number, or { los = .., nlos = .. }")
+    dwell_s: Dwell | None = key("mean time in LOS and in NLOS, { los = 2, nlos = 2 }")
+    transition: Chain | None = key("rows: sight now, columns: sight at the next step, [[0.9, 0.1], [0.3, 0.7]]")
+    known: Any = key(
+        'known sight: "LLNN", one letter per step, or [{ until_s = 2, sight = "los" }, { sight = "nlos" }]'
+    )
+    start: Law | None = key("probabilities at step 0, { los = 0.5, nlos = 0.5 }; left out: the chain's long-run shares")
+
+    @model_validator(mode="after")
+    def _one_way(self):
+        ways = self.given("stay", "dwell_s", "transition", "known")
+        if len(ways) != 1:
+            raise fail(f"has {', '.join(ways) or 'no chain'}", "Give one of stay, dwell_s, transition, known")
+        if ways == ["known"] and self.start is not None:
+            raise fail("has known and start", "A known sight needs no start: remove it")
+        return self
+
+
+class NoiseTable(Section):
+    """Noise of a range in one sight condition."""
+
+    mean_m: Number | None = key("mean error in metres; 0 if left out")
+    std_m: Positive | None = key("standard deviation in metres, positive")
+    weights: Positives | None = key("shares of a Gaussian mixture, summing to one, with means_m and stds_m")
+    means_m: Numbers | None = key("means of the mixture's components")
+    stds_m: Positives | None = key("standard deviations of the mixture's components")
+
+    @model_validator(mode="after")
+    def _one_way(self):
+        mixture = self.given("weights", "means_m", "stds_m")
+        if mixture and (len(mixture) < 3 or self.given("mean_m", "std_m")):
+            raise fail(
+                f"has {', '.join(self.given('mean_m', 'std_m') + mixture)}",
+                "Give std_m (and mean_m), or weights, means_m and stds_m",
+            )
+        if not mixture and self.std_m is None:
+            raise fail("has no std_m", f"Add std_m: {NoiseTable.model_fields['std_m'].description}")
+        if mixture and not len(self.weights or ()) == len(self.means_m or ()) == len(self.stds_m or ()):
+            raise fail("has weights, means_m and stds_m of different lengths", "Give one of each per component")
+        if mixture and abs(sum(self.weights or ()) - 1) > ROUNDING:
+            raise fail(f"has weights that sum to {sum(self.weights or ()):.6g}", "Weights must sum to one")
+        return self
+
+
+class NlosTable(NoiseTable):
+    """Noise of a range in NLOS."""
+
+    plus_los: bool = Field(False, strict=True, description="true: mean_m and std_m are the excess on top of LOS noise")
+
+
+class OutlierTable(Section):
+    """Rare wide errors that both sight conditions share."""
+
+    share: Probability = needed("share of measurements, for example 0.01; 0 for none")
+    mean_m: Number = Field(0.0, description="mean error of outliers in metres")
+    std_m: Positive = needed("standard deviation of outliers in metres, positive")
+
+    @model_validator(mode="after")
+    def _some_regular(self):
+        if self.share == 1:
+            raise fail("has share = 1", "Not every measurement can be an outlier: give a share below 1")
+        return self
+
+
+class LinksSection(Section):
+    """What all links share."""
+
+    measure: Literal["range"] | None = key('what a link measures: "range", the distance to the anchor in metres')
+    sight: SightTable | None = key("switching of LOS and NLOS, for example { stay = 0.9 } or { dwell_s = { .. } }")
+    los: NoiseTable | None = key("range error in LOS, for example { std_m = 150 }")
+    nlos: NlosTable | None = key("range error in NLOS, for example { plus_los = true, mean_m = 513, std_m = 409 }")
+    outlier: OutlierTable | None = key("rare wide errors in both, for example { share = 0.01, std_m = 2000 }")
+    missing_steps: tuple[Whole, ...] | None = key("steps without a measurement, for example [4, 5]")
+
+
+class AnchorTable(LinksSection):
+    """One anchor: its position, and what differs from [links]."""
+
+    position_m: Point | None = key("position in metres, for example position_m = [-3000, -2000]")
+
+
+class ScenarioFile(Section):
+    """A whole scenario file."""
+
+    format: Literal[1] = needed(f"version of the file format, format = {FORMAT}")
+    title: Text = Field("", description="one line that names the scenario")
+    anchors_csv: Text | None = key("table of anchors with the columns anchor_id, x_m, y_m and, in 3-D, z_m")
+    time: TimeSection = needed("a section [time] with step_s and steps")
+    motion: MotionSection = needed('a section [motion] with model = "constant-velocity" and psd_m2_s3')
+    prior: PriorSection = needed("a section [prior] with position_m, position_std_m, velocity_m_s, velocity_std_m_s")
+    links: LinksSection = Field(LinksSection(), description="a section [links] with what all links share")
+    anchors: dict[str, AnchorTable] = Field(
+        {}, description="a section [anchors], a line NAME = { position_m = [..] } each"
+    )

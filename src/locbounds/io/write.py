@@ -1,0 +1,234 @@
+"""From a scenario to the keys of a scenario file: the plainest keys that read back to exactly the same numbers."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import jax
+import numpy as np
+
+from locbounds.errors import InputError
+from locbounds.io import build
+from locbounds.io.schema import (
+    FORMAT,
+    NlosTable,
+    NoiseTable,
+    OutlierTable,
+    PriorSection,
+    SightTable,
+    TimeSection,
+)
+from locbounds.motion import ConstantVelocity
+from locbounds.noise import Gaussian, GaussianMixture, Noise
+from locbounds.priors import GaussianPrior
+from locbounds.scenario import Link, Scenario
+from locbounds.sight import DwellSight, KnownSight, MarkovSight, Sight
+from locbounds.times import Times
+
+MOST_DIGITS_OF_EXCESS = 9  # an NLOS excess is written as such only if it is a number a person may have typed
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two model pieces agree leaf by leaf, exactly.
+
+    >>> same(Gaussian(0, 1), Gaussian(0, 1)), same(Gaussian(0, 1), Gaussian(0, 2))
+    (True, False)
+    """
+    if jax.tree.structure(a) != jax.tree.structure(b):
+        return False
+    pairs = zip(jax.tree.leaves(a), jax.tree.leaves(b), strict=True)
+    return all(np.array_equal(x, y) for x, y in pairs)
+
+
+def plain(value: Any) -> Any:
+    """NumPy numbers as the shortest TOML numbers.
+
+    >>> plain(np.array([500.0, 0.2]))
+    [500, 0.2]
+    """
+    if np.ndim(value):
+        return [plain(v) for v in value]
+    value = float(value)
+    return int(value) if value.is_integer() and abs(value) < 1e15 else value
+
+
+def _first(candidates: Iterable[dict], rebuild: Callable[[dict], Any], target: Any) -> dict | None:
+    """The first candidate that rebuilds the target exactly."""
+    for candidate in candidates:
+        try:
+            if same(rebuild(candidate), target):
+                return candidate
+        except ValueError:  # not a valid way to write this one
+            continue
+    return None
+
+
+def _cannot(what: str) -> InputError:
+    return InputError(f"{what} has no form in a scenario file", "Keep this scenario in Python")
+
+
+def time_keys(times: Times) -> dict:
+    """Step and number of steps, or the list of times."""
+    steps = times.steps
+    candidates = [{"step_s": plain(t), "steps": steps} for t in (times.time_s[1], times.time_s[-1] / steps)]
+    candidates.append({"times_s": plain(times.time_s)})
+    found = _first(candidates, lambda keys: build.build_times(TimeSection.model_validate(keys)), times)
+    assert found is not None
+    return found
+
+
+def motion_keys(motion: Any) -> dict:
+    """Name and intensity of the motion model."""
+    if type(motion) is not ConstantVelocity:
+        raise _cannot(f"the motion model {type(motion).__name__}")
+    q = motion.intensity
+    intensity = plain(q[0] if np.all(q == q[0]) else q)
+    if motion.discrete:
+        return {"model": "constant-velocity-discrete", "acceleration_var_m2_s4": intensity}
+    return {"model": "constant-velocity", "psd_m2_s3": intensity}
+
+
+def _spreads(covariance: Any) -> list:
+    """Ways to write a covariance: one deviation, one per axis, the matrix."""
+    deviations = np.sqrt(np.diag(covariance))
+    return [plain(deviations[0]), plain(deviations), plain(covariance)]
+
+
+def prior_keys(prior: GaussianPrior) -> dict:
+    """Means and deviations, or the whole covariance."""
+    n = len(prior.mean) // 2
+    means = {"position_m": plain(prior.mean[:n]), "velocity_m_s": plain(prior.mean[n:])}
+    blocks = (_spreads(prior.covariance[:n, :n]), _spreads(prior.covariance[n:, n:]))
+    candidates = [
+        {
+            "position_m": means["position_m"],
+            "position_std_m": p,
+            "velocity_m_s": means["velocity_m_s"],
+            "velocity_std_m_s": v,
+        }
+        for p in blocks[0]
+        for v in blocks[1]
+    ]
+    candidates.append(means | {"covariance": plain(prior.covariance)})
+    found = _first(candidates, lambda keys: build.build_prior(PriorSection.model_validate(keys)), prior)
+    assert found is not None
+    return found
+
+
+def _by_sight(pair: Any) -> dict:
+    return {"los": plain(pair[0]), "nlos": plain(pair[1])}
+
+
+def sight_keys(sight: Sight, times: Times) -> dict:
+    """The chain, or the known schedule in letters."""
+    if isinstance(sight, KnownSight):
+        return {"known": "".join("LN"[mode] for mode in sight.modes)}
+    start = {"start": _by_sight(sight.start)} if len(sight.start) == 2 else {}
+    if isinstance(sight, DwellSight):
+        return {"dwell_s": _by_sight(sight.dwell_s), **start}
+    if not isinstance(sight, MarkovSight) or len(sight.start) != 2:
+        raise _cannot(f"the sight model {type(sight).__name__} with {len(sight.start)} conditions")
+    stay = np.diag(sight.transition)
+    candidates = [
+        {"stay": plain(stay[0]), **start},
+        {"stay": _by_sight(stay), **start},
+        {"transition": plain(sight.transition), **start},
+    ]
+    found = _first(candidates, lambda keys: build.build_sight(SightTable.model_validate(keys), times), sight)
+    assert found is not None
+    return found
+
+
+def _noise_table(noise: Noise) -> dict:
+    if isinstance(noise, GaussianMixture):
+        return {"weights": plain(noise.weights), "means_m": plain(noise.means), "stds_m": plain(noise.stds)}
+    if not isinstance(noise, Gaussian):
+        raise _cannot(f"the noise {type(noise).__name__}")
+    mean = {"mean_m": plain(noise.mean)} if noise.mean != 0 else {}
+    return {**mean, "std_m": plain(noise.std)}
+
+
+def _as_excess(los: Noise, nlos: Noise) -> dict | None:
+    if not isinstance(los, Gaussian) or not isinstance(nlos, Gaussian) or nlos.std <= los.std:
+        return None
+    mean, std = nlos.mean - los.mean, np.sqrt(nlos.std**2 - los.std**2)
+    short = [float(f"{x:.{MOST_DIGITS_OF_EXCESS}g}") for x in (mean, std)]
+    return {"plus_los": True, "mean_m": plain(short[0]), "std_m": plain(short[1])}
+
+
+def _without_outlier(los: Noise, nlos: Noise) -> tuple[Noise, Noise, dict] | None:
+    """Split off a last component that both conditions share."""
+    if not (isinstance(los, GaussianMixture) and isinstance(nlos, GaussianMixture)):
+        return None
+    if not len(los.weights) == len(nlos.weights) == 2 or not same(los.weights, nlos.weights):
+        return None
+    if los.means[1] != nlos.means[1] or los.stds[1] != nlos.stds[1]:
+        return None
+    outlier = {"share": plain(los.weights[1]), "mean_m": plain(los.means[1]), "std_m": plain(los.stds[1])}
+    return Gaussian(los.means[0], los.stds[0]), Gaussian(nlos.means[0], nlos.stds[0]), outlier
+
+
+def noise_keys(los: Noise, nlos: Noise) -> dict:
+    """Noise of both sight conditions: excess over LOS and a shared outlier component where that is what it is."""
+    candidates = []
+    for base_los, base_nlos, outlier in filter(None, (_without_outlier(los, nlos), (los, nlos, None))):
+        rest = {"outlier": outlier} if outlier else {}
+        for table in filter(None, (_as_excess(base_los, base_nlos), _noise_table(base_nlos))):
+            candidates.append({"los": _noise_table(base_los), "nlos": table, **rest})
+
+    def rebuild(keys: dict) -> tuple[Noise, Noise]:
+        outlier = OutlierTable.model_validate(keys["outlier"]) if "outlier" in keys else None
+        return build.build_noises(
+            NoiseTable.model_validate(keys["los"]), NlosTable.model_validate(keys["nlos"]), outlier
+        )
+
+    found = _first(candidates, rebuild, (los, nlos))
+    assert found is not None
+    return found
+
+
+def link_keys(link: Link, times: Times) -> dict:
+    """All keys of one link except its position."""
+    if len(link.noises) != 2:
+        raise _cannot(f"anchor {link.name} with {len(link.noises)} sight conditions")
+    keys = {"measure": "range", "sight": sight_keys(link.sight, times), **noise_keys(*link.noises)}
+    if link.reports is not None:
+        keys["missing_steps"] = (np.flatnonzero(~np.asarray(link.reports, dtype=bool)) + 1).tolist()
+    return keys
+
+
+def shared_keys(tables: list[dict]) -> dict:
+    """What goes into [links]: the most common value of each key that all links have, if it saves a repetition."""
+    shared = {}
+    for name in tables[0]:
+        if all(name in table for table in tables):
+            counts = Counter(repr(table[name]) for table in tables)
+            value, count = counts.most_common(1)[0]
+            if count > 1 or len(tables) == 1:
+                shared[name] = next(table[name] for table in tables if repr(table[name]) == value)
+    return shared
+
+
+def file_keys(scenario: Scenario) -> dict[str, Any]:
+    """Everything a scenario file says, as nested dictionaries in the file's order.
+
+    Raises
+    ------
+    InputError
+        If a model piece has no form in a scenario file.
+    """
+    tables = [link_keys(link, scenario.times) for link in scenario.links]
+    shared = shared_keys(tables)
+    anchors = {}
+    for link, table in zip(scenario.links, tables, strict=True):
+        own = {name: value for name, value in table.items() if name not in shared or shared[name] != value}
+        anchors[link.name] = {"position_m": plain(link.measurement.anchor), **own}
+    return {
+        "format": FORMAT,
+        "title": scenario.title,
+        "time": time_keys(scenario.times),
+        "motion": motion_keys(scenario.motion),
+        "prior": prior_keys(scenario.prior),
+        "links": shared,
+        "anchors": anchors,
+    }

@@ -1,0 +1,55 @@
+"""Figures of results; every function returns a matplotlib figure and saves nothing."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from locbounds.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+BAND = 1.959963984540054  # a 95 % band
+
+
+def rmse(results: Sequence[Result] | Result, *, title: str = "", against: str = "time") -> "Figure":
+    """Position RMSE over time with 95 % bands: bounds as lines, filters dashed.
+
+    Parameters
+    ----------
+    results
+        Bounds and filters on one scenario.
+    title
+        Title of the figure.
+    against
+        ``"time"`` in seconds or ``"step"``.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> figure = rmse(lb.bcrb(lb.papers.fritsche2013.scenario(steps=10)), title="BCRB")
+    >>> figure.axes[0].get_ylabel()
+    'position RMSE in m'
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.3), layout="constrained")
+    axes = figure.subplots()
+    for k, result in enumerate([results] if isinstance(results, Result) else results):
+        t = result.time_s if against == "time" else np.arange(len(result.time_s))
+        middle, error = result.position_rmse.values, result.position_rmse_stderr.values
+        style = {"ls": "-", "lw": 1.8} if result.kind == "bound" else {"ls": "--", "lw": 1.3}
+        conditional = f" along {result.track}" if result.track else ""
+        (line,) = axes.plot(t, middle, label=f"{result.name}{conditional}", color=f"C{k}", **style)
+        axes.fill_between(
+            t, middle - BAND * error, middle + BAND * error, color=line.get_color(), alpha=0.25, linewidth=0
+        )
+    axes.set_xlabel("time in s" if against == "time" else "time step")
+    axes.set_ylabel("position RMSE in m")
+    axes.margins(x=0.01)
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False, title="bands: 95 % of the Monte Carlo error", title_fontsize="small")
+    if title:
+        axes.set_title(title, loc="left")
+    return figure

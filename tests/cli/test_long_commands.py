@@ -1,0 +1,68 @@
+"""``track``, ``paper`` and ``fit`` through the shell: wrong options, and Ctrl-C in the middle."""
+
+import pytest
+from typer.testing import CliRunner
+
+from locbounds.cli.app import app
+
+
+@pytest.fixture(autouse=True)
+def _a_scenario_in_an_empty_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("LOCBOUNDS_CACHE", "off")
+    assert run("new", "s.toml").exit_code == 0
+    (tmp_path / "s.toml").write_text((tmp_path / "s.toml").read_text().replace("steps = 100 ", "steps = 3 "))
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def files(folder):
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file() and p.name != ".locbounds")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["track", "s.toml", "--bounds", "bcbr"], ["unknown bound 'bcbr'", "Did you mean bcrb?"]),
+        (["track", "s.toml", "--filters", "imm-efk"], ["unknown filter 'imm-efk'", "Did you mean imm-ekf?"]),
+        (["track", "s.toml", "--bounds", "imm-ekf"], ["unknown bound 'imm-ekf'", "Known: bcrb"]),
+        (["track", "s.toml", "--filters", "none", "--rtol", "0"], ["rtol is 0", "between 0 and 1"]),
+        (["track", "s.toml", "--filters", "none", "--rtol", "nan"], ["rtol is nan"]),
+        (["track", "s.toml", "--runs", "0"], ["--runs", "--help"]),
+        (["track", "s.toml", "--filters", "none", "--bounds", "known-sight"], ["is random", "enumer"]),
+        (["track", "none.toml"], ["cannot read none.toml", "locbounds new none.toml"]),
+        (
+            ["track", "s.toml", "--filters", "none", "--ranges", "r.csv"],
+            ["--anchors, --truth", "Give ranges, anchors and truth"],
+        ),
+        (["paper", "fritsche"], ["unknown paper 'fritsche'", "Did you mean fritsche2013?"]),
+        (["paper", "fritsche2013", "--samples", "0"], ["--samples"]),
+        (["paper", "fritsche2013", "--out", "s.toml"], ["s.toml is a file", "--out"]),
+        (["fit", "none.csv", "--anchors", "a.csv", "--truth", "t.csv"], ["none.csv"]),
+        (["fit", "none.csv"], ["--anchors, --truth missing"]),
+    ],
+)
+def test_wrong_options_are_refused_and_nothing_is_written(tmp_path, arguments, words):
+    done = run(*arguments)
+    assert done.exit_code == 2, done.output
+    assert done.stderr.startswith("error: ")
+    assert "\nremedy: " in done.stderr
+    assert "Traceback" not in done.output
+    for word in words:
+        assert word in done.stderr
+    assert files(tmp_path) == ["s.toml"]
+    assert not (tmp_path / "s-out").exists()
+
+
+def test_ctrl_c_between_bounds_keeps_the_finished_one(tmp_path, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("locbounds.bounds.conditional.enumer", interrupted)
+    done = run("track", "s.toml", "--bounds", "bcrb,enumer", "--filters", "none", "--rtol", "0.1")
+    assert done.exit_code == 130
+    assert done.stderr.startswith("error: interrupted\nremedy: kept what was finished: s-out/rmse.csv")
+    rows = (tmp_path / "s-out" / "rmse.csv").read_text().splitlines()
+    assert [row.split(",")[0] for row in rows] == ["method"] + ["bcrb"] * 4
