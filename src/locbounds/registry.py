@@ -36,6 +36,8 @@ class Method(NamedTuple):
         Citation keys of docs/references.bib.
     assumptions
         Predicates on a scenario.
+    conditions
+        Under which condition it is valid at all.
     """
 
     id: str
@@ -48,10 +50,11 @@ class Method(NamedTuple):
     fails: str
     references: tuple[str, ...]
     assumptions: tuple[Assumption, ...] = ()
+    conditions: tuple[str, ...] = ()
 
     def verdict(self, scenario: Scenario, conditions: tuple[str, ...] = ()) -> Verdict:
         """Whether it applies to a scenario."""
-        return judge(self.assumptions, scenario, grounds=self.grounds, conditions=conditions)
+        return judge(self.assumptions, scenario, grounds=self.grounds, conditions=self.conditions + conditions)
 
 
 METHODS: dict[str, Method] = {
@@ -109,6 +112,7 @@ METHODS: dict[str, Method] = {
             "Not a bound for filters that use NLOS ranges; right where the NLOS excess is unknown and arbitrary.",
             ("qi2006",),
             (SMOOTH_NOISE, LOS_AND_NLOS),
+            ("estimators that discard NLOS ranges, or an NLOS excess about which nothing is known",),
         ),
         Method(
             "imm-ekf",
@@ -197,7 +201,7 @@ def describe(entry: Method) -> dict[str, Any]:
         "kind": entry.kind,
         "summary": entry.summary,
         "sees": sorted(entry.sees),
-        "assumes": [*entry.grounds, *(a.text for a in entry.assumptions)],
+        "assumes": [*entry.conditions, *entry.grounds, *(a.text for a in entry.assumptions)],
         "fails": entry.fails,
         "cite": list(entry.references),
     }

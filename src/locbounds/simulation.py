@@ -83,9 +83,11 @@ def draw_sight(
 
 
 def draw_noise(key: Array, noises: tuple[Noise, ...], sight: Int[Array, "*n"]) -> Float[Array, "*n"]:
-    """Noise given the sight of every sample."""
-    keys = jax.random.split(key, len(noises))
-    draws = [noise.sample(k, sight.shape) for noise, k in zip(noises, keys, strict=True)]
+    """Noise given the sight of every sample.
+
+    Every mode draws from the same key and one of the draws is used, so that equal random numbers are made only once.
+    """
+    draws = [noise.sample(key, sight.shape) for noise in noises]
     w = draws[0]
     for mode, draw in enumerate(draws[1:], start=1):
         w = jnp.where(sight == mode, draw, w)

@@ -42,7 +42,7 @@ def over_tracks(
     first
         The results' rows at step 0, the same for all tracks.
     hypotheses
-        Arrays of this many rows of tracks are what the kernel works on; sets the size of a chunk.
+        Rows of the arrays [rows, tracks] that the kernel works on: sets how many tracks make a chunk.
     static
         Hashable options of the kernel.
 
