@@ -3,7 +3,8 @@
 Importing locbounds never switches the user's JAX configuration. Every public function that computes is decorated
 with :func:`double_precision`: plain calls run inside ``jax.enable_x64(True)`` and return NumPy float64; calls that
 carry JAX tracers (``grad``, ``jit``, ``vmap``) go straight to the kernel, if the caller's JAX computes in double
-precision, and raise :class:`~locbounds.errors.PrecisionError` otherwise.
+precision, and raise :class:`~locbounds.errors.PrecisionError` otherwise. A call inside a user's ``jit`` that depends on
+none of its arguments is a plain call: it is computed at once, and is a constant of the compiled function.
 """
 
 import functools
@@ -60,7 +61,7 @@ def double_precision(function: Callable[P, R]) -> Callable[P, R]:
                     'Add the line jax.config.update("jax_enable_x64", True) before the first use of JAX',
                 )
             return function(*args, **kwargs)
-        with jax.enable_x64(True):
+        with jax.ensure_compile_time_eval(), jax.enable_x64(True):
             args, kwargs = jax.tree.map(_widen, (args, kwargs))
             return jax.tree.map(_widen, function(*args, **kwargs))
 
@@ -68,7 +69,7 @@ def double_precision(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def float64(value: Any) -> Any:
-    """A model leaf: NumPy float64, or the tracer or wrapped object itself while JAX transforms the model."""
-    if value is None or _is_tracer(value) or type(value) is object:
+    """A model leaf: NumPy float64, or a traced array (also from a list with tracers) while JAX transforms the model."""
+    if value is None or type(value) is object:  # object(): what JAX puts into a pytree to look at its structure
         return value
-    return np.asarray(value, dtype=np.float64)
+    return jnp.asarray(value, dtype=float) if traced(value) else np.asarray(value, dtype=np.float64)

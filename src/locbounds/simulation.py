@@ -12,7 +12,7 @@ from locbounds.blocks import Stream, block_key, check_seed
 from locbounds.errors import InputError
 from locbounds.linalg import psd_root
 from locbounds.noise import Noise
-from locbounds.precision import double_precision
+from locbounds.precision import double_precision, traced
 from locbounds.scenario import Scenario
 
 RUNS_PER_BLOCK = 1024
@@ -43,10 +43,10 @@ class Draws(NamedTuple):
 
 
 def draw_states(key: Array, scenario: Scenario, runs: int) -> Float[Array, "runs times state"]:
-    """Tracks from the prior and the motion model."""
+    """Tracks from the prior and the motion model; differentiable in both."""
     first, driving = jax.random.split(key)
     n = scenario.motion.state_size
-    x0 = scenario.prior.mean + jax.random.normal(first, (runs, n)) @ psd_root(jnp.asarray(scenario.prior.covariance)).T
+    x0 = scenario.prior.mean + jax.random.normal(first, (runs, n)) @ psd_root(jnp.asarray(scenario.prior.covariance))
     roots = psd_root(scenario.process_noise)
     v = jnp.einsum("krj,kij->kri", jax.random.normal(driving, (scenario.steps, runs, n)), roots)
 
@@ -82,8 +82,28 @@ def draw_sight(
     return sight_from_uniforms(start, transitions, jax.random.uniform(key, (len(transitions) + 1, runs)))
 
 
+def likelihood_ratios(
+    sight: Int[Array, "steps runs"], start: Float[Array, " modes"], transitions: Float[Array, "steps modes modes"]
+) -> Float[Array, "steps runs"]:
+    """Ones, whose derivative with respect to the chain is that of the log-probability of the sight up to every step.
+
+    Drawing a sight has no derivative. Means over draws that are weighted with these ratios have the right one:
+    ``d E[f] = E[d f] + E[f d log p]``.
+    """
+    first = (jnp.asarray(start) @ transitions[0])[sight[0]]
+    later = jax.vmap(lambda T, now, next: T[now, next])(transitions[1:], sight[:-1], sight[1:])
+    log_p = jnp.cumsum(jnp.log(jnp.concatenate([first[None], later])), axis=0)
+    return jnp.exp(log_p - jax.lax.stop_gradient(log_p))
+
+
+def equal_weights(ratios: Float[Array, "steps runs"], groups: int) -> Float[Array, "steps groups runs_per_group"]:
+    """Likelihood ratios as weights that sum to one in every group, which removes the noise of what all draws share."""
+    grouped = ratios.reshape(len(ratios), groups, -1)
+    return grouped / grouped.sum(-1, keepdims=True)
+
+
 def draw_noise(key: Array, noises: tuple[Noise, ...], sight: Int[Array, "*n"]) -> Float[Array, "*n"]:
-    """Noise given the sight of every sample.
+    """Noise given the sight of every sample; differentiable in the noises.
 
     Every mode draws from the same key and one of the draws is used, so that equal random numbers are made only once.
     """
@@ -134,6 +154,11 @@ def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
     InputError
         If ``runs`` is below 1.
 
+    Notes
+    -----
+    States and measurements can be differentiated with respect to prior, motion, anchors and noises, for the sight that
+    was drawn; the sight itself jumps.
+
     Examples
     --------
     >>> import locbounds as lb
@@ -146,4 +171,6 @@ def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
     blocks = [
         _draw_block(scenario, np.uint32(seed), np.uint32(b), RUNS_PER_BLOCK) for b in range(-(-runs // RUNS_PER_BLOCK))
     ]
-    return Draws(*(np.concatenate([np.asarray(part) for part in parts])[:runs] for parts in zip(*blocks, strict=True)))
+    if traced(scenario):
+        return jax.tree.map(lambda *parts: jnp.concatenate(parts)[:runs], *blocks)
+    return jax.tree.map(lambda *parts: np.concatenate([np.asarray(part) for part in parts])[:runs], *blocks)

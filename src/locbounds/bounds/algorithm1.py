@@ -10,10 +10,10 @@ from locbounds.axes import Array, Float
 from locbounds.blocks import GROUPS, Stream, block_key, check_seed
 from locbounds.bounds.common import bound_result, prepare
 from locbounds.bounds.expectation import Prior
-from locbounds.bounds.precision_control import Estimate
+from locbounds.bounds.precision_control import Estimate, check_rtol
 from locbounds.bounds.score_covariance import noise_process
-from locbounds.errors import RefusedError
-from locbounds.precision import double_precision
+from locbounds.errors import InputError, RefusedError
+from locbounds.precision import double_precision, traced
 from locbounds.result import Result
 from locbounds.scenario import Scenario
 from locbounds.simulation import draw_noise, draw_sight, draw_states
@@ -67,8 +67,10 @@ def _scores(scenario, seed, block, *, samples) -> Float[Array, "samples horizons
             k, x, z, T, reported = inputs
             log_l = log_density(x, z, reported)
             gradient = jax.jacfwd(log_density)(x, z, reported)
-            l = jnp.exp(log_l - log_l.max())
-            f = l * (f @ T)
+            predicted = f @ T
+            l = jnp.exp(log_l - jnp.max(jnp.where(predicted > 0, log_l, -jnp.inf)))
+            l = jnp.where(predicted > 0, l, 0.0)  # a mode that cannot be has no say in the scale
+            f = l * predicted
             D = l[:, None, None] * jnp.einsum("ij,inx->jnx", T, D)
             D = jnp.asarray(D).at[:, k].add(f[:, None] * gradient)
             total = f.sum()
@@ -136,6 +138,9 @@ def bcrb_algorithm1(scenario: Scenario, *, samples: int = 2048, seed: int = 0) -
     >>> bool(abs(reference.mean_position_rmse() - bound.mean_position_rmse()) < 4 * error)
     True
     """
+    if traced(scenario):
+        raise InputError("Algorithm 1 cannot be transformed by JAX", "Use locbounds.bcrb, which can")
+    check_rtol(None, samples)
     expectation, verdict = prepare("bcrb", scenario, Prior())
     seed_key = np.uint32(check_seed(seed))
     modes = int(np.prod([len(link.noises) for link in scenario.links]))

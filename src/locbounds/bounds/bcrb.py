@@ -13,6 +13,7 @@ from locbounds.bounds.expectation import Expectation, directions, windows
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
 from locbounds.bounds.recursion import covariance_deviations, covariance_recursion
 from locbounds.bounds.score_covariance import NoiseProcess, noise_process, score_covariance_increments
+from locbounds.errors import InputError
 from locbounds.precision import double_precision, traced
 from locbounds.result import Result
 from locbounds.scenario import Scenario
@@ -132,7 +133,7 @@ def bcrb(
         Where range gradients are taken: ``Prior()`` (default, the Bayesian bound) or ``AlongTrack(positions)``.
     window
         How many steps back a measurement's information correlates with that of others; by default it grows until
-        shortening it by a quarter changes no step by more than ``rtol / 10``.
+        shortening it by a quarter changes no step by more than ``rtol / 10`` (``rtol`` 1e-3 where none is given).
     progress
         Called with (samples, precision reached, target) after every look.
 
@@ -143,6 +144,7 @@ def bcrb(
         from z_1..z_k. ``diagnostics["truncation"]`` is the relative change of the position RMSE, at the worst step,
         when the window is shortened by a quarter. It indicates the error made by truncating at the window itself, and
         exceeds it where the entries left out decay quickly; it is no guarantee, and the error may have either sign.
+        NaN where the window was given.
 
     Raises
     ------
@@ -154,6 +156,10 @@ def bcrb(
     Notes
     -----
     Fritsche 2013, eqs. 2 to 9, with Louis' identity in place of products of scores.
+
+    JAX transforms it (``jit``, ``vmap``, ``grad``) with respect to any number of the scenario, with a fixed number of
+    draws: ``samples``, by default one block, and ``window``, by default 12 steps. Derivatives with respect to the
+    chains carry the likelihood ratio of the drawn sights and are much noisier than all others.
 
     Examples
     --------
@@ -212,15 +218,18 @@ def known_sight(
 def separated(id, scenario, rtol, samples, seed, expectation, window, progress) -> Result:
     """The engine: blocks of score covariances and geometries until window and precision suffice."""
     expectation, verdict = prepare(id, scenario, expectation)
-    rtol_target = check_rtol(rtol, samples)
+    differentiable = traced(scenario, expectation)
+    rtol_target = check_rtol(rtol, samples, differentiable)
+    if window is not None and (int(window) != window or window < 1):
+        raise InputError(f"the window is {window}", "Give a whole number of steps, at least 1")
     seed_key = np.uint32(check_seed(seed))
     processes = [noise_process(scenario, link) for link in scenario.links]
     first = _distinct(processes)
     distinct = sorted(set(first))
     sharing = tuple(tuple(m for m, i in enumerate(first) if i == process) for process in distinct)
     index = np.array(scenario.motion.position_index)
-    size = min(FIRST_WINDOW if window is None else window, scenario.steps)
-    fixed = samples is not None or traced(scenario, expectation)
+    size = min(FIRST_WINDOW if window is None else int(window), scenario.steps)
+    fixed = samples is not None or differentiable
     while True:
         groups = int(np.clip(TABLE_BYTES // (8 * scenario.steps * size**2), 8, GROUPS))
         blocks = -(-(samples or 1) // (groups * PATHS)) if fixed else None
@@ -228,7 +237,9 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
         def draw(block: int, groups: int = groups, size: int = size):
             b = np.uint32(block)
             C = [
-                score_covariance_increments(processes[i], seed_key, b, groups=groups, paths=PATHS, window=size)
+                score_covariance_increments(
+                    processes[i], seed_key, b, groups=groups, paths=PATHS, window=size, differentiable=differentiable
+                )
                 for i in distinct
             ]
             G = _geometry(scenario, expectation, seed_key, b, groups=groups, window=size, sharing=sharing)
@@ -240,8 +251,8 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
             return Estimate(P, P[:, index, index].sum(-1), _deviations(scenario, C, G))
 
         first_block = draw(0)
-        truncation = 0.0
-        if window is None and size < scenario.steps and not traced(scenario, expectation):
+        truncation = 0.0 if size == scenario.steps or id == "known-sight" else np.nan  # known sight: nothing to cut
+        if window is None and size < scenario.steps and not differentiable:
             truncation = _truncation(scenario, *first_block)
             if truncation > rtol_target / 10:
                 size = min(2 * size, scenario.steps)

@@ -5,6 +5,7 @@ and the bound obeys the covariance recursion ``P <- F P F' + Q``, ``P <- P (I + 
 """
 
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -21,7 +22,7 @@ from locbounds.precision import double_precision, traced
 from locbounds.quadrature import deviations
 from locbounds.result import Result
 from locbounds.scenario import Scenario
-from locbounds.simulation import sight_from_uniforms
+from locbounds.simulation import equal_weights, likelihood_ratios, sight_from_uniforms
 
 SCHEDULES = 32  # sight schedules per group and block
 SCHEDULES_FOR_GEOMETRY = 4  # per group: enough for how the bound changes with the geometry
@@ -58,29 +59,44 @@ def _geometry(scenario, expectation, seed, block, *, groups) -> Float[Array, "gr
     return jnp.einsum("lgnka,lgnkb->glkab", u, u) / u.shape[2]
 
 
-@partial(jax.jit, static_argnames=("groups", "los_ranges_only"))
-def _schedules(scenario, seed, block, *, groups, los_ranges_only) -> Float[Array, "groups schedules links steps"]:
-    """Information of every range about its own distance, for random sight schedules in antithetic pairs."""
-    rows = []
+class _Schedules(NamedTuple):
+    """Information of every range about its own distance, for random sight schedules, and their weights in the mean.
+
+    The weights are equal (None: without their derivatives, which make those of the mean right: a draw has none).
+    """
+
+    information: Float[Array, "groups schedules links steps"]
+    weights: Float[Array, "steps groups schedules"] | None
+
+
+@partial(jax.jit, static_argnames=("groups", "los_ranges_only", "differentiable"))
+def _schedules(scenario, seed, block, *, groups, los_ranges_only, differentiable) -> _Schedules:
+    """Random sight schedules in antithetic pairs."""
+    rows, ratios = [], 1.0
     for m, link in enumerate(scenario.links):
         process = noise_process(scenario, link)
         key = jax.random.fold_in(block_key(seed, Stream.SCHEDULES, block), m)
         u = jax.random.uniform(key, (len(process.transitions) + 1, groups * SCHEDULES // 2))
-        sight = sight_from_uniforms(process.start, process.transitions, jnp.stack([u, 1 - u], -1).reshape(len(u), -1)).T
+        sight = sight_from_uniforms(process.start, process.transitions, jnp.stack([u, 1 - u], -1).reshape(len(u), -1))
+        if differentiable:
+            ratios = ratios * likelihood_ratios(sight, process.start, process.transitions)
         info = mode_information(process)
         info = info * (jnp.arange(len(info)) == 0) if los_ranges_only else info
-        rows.append((info[sight] * process.reports).reshape(groups, SCHEDULES, -1))
-    return jnp.stack(rows, 2)
+        rows.append((info[sight.T] * process.reports).reshape(groups, SCHEDULES, -1))
+    return _Schedules(jnp.stack(rows, 2), equal_weights(jnp.asarray(ratios), groups) if differentiable else None)
 
 
 @jax.jit
-def _group_means(scenario, info, G) -> Float[Array, "groups times state state"]:
+def _group_means(scenario, schedules, G) -> Float[Array, "groups times state state"]:
     """Group means over schedules of the bound for a known schedule."""
 
     def one(info):
         return conditional_recursion(scenario, jnp.einsum("lk,lkab->kab", info, G))
 
-    return jax.vmap(lambda group: jax.vmap(one)(group).mean(0))(info)
+    if schedules.weights is None:
+        return jax.vmap(lambda group: jax.vmap(one)(group).mean(0))(schedules.information)
+    weights = jnp.concatenate([schedules.weights[:1], schedules.weights])  # step 0 is the same for every schedule
+    return jnp.einsum("kgs,gskij->gkij", weights, jax.vmap(jax.vmap(one))(schedules.information))
 
 
 @jax.jit
@@ -96,13 +112,15 @@ def _geometry_deviations(scenario, info, G) -> Float[Array, "groups times"]:
         return jax.jvp(position_mse, (mean,), (change,))[1]
 
     G = jnp.broadcast_to(G, (info.shape[0], *G.shape[1:]))
-    return jax.vmap(jax.vmap(deviation, (0, None)))(info, G - mean).mean(1)
+    changes = jax.vmap(jax.vmap(deviation, (0, None)))(info, G - mean).mean(1)
+    return deviations(changes)[1]  # every group has its own schedules: their changes cancel up to sampling only
 
 
 def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, progress) -> Result:
     """The common part of enumer and los-only, which differ in the information of NLOS ranges and in the verdict."""
     expectation, verdict = prepare(id, scenario, expectation)
-    target = check_rtol(rtol, samples)
+    differentiable = traced(scenario, expectation)
+    target = check_rtol(rtol, samples, differentiable)
     seed_key = np.uint32(check_seed(seed))
     blocks = None if samples is None else -(-samples // (GROUPS * SCHEDULES))
 
@@ -110,20 +128,27 @@ def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, prog
         tables = [_geometry(scenario, expectation, seed_key, np.uint32(b), groups=GROUPS) for b in range(count)]
         return sum(tables[1:], start=tables[0]) / count
 
-    def schedules(block: int) -> Array:
-        return _schedules(scenario, seed_key, np.uint32(block), groups=GROUPS, los_ranges_only=id == "los-only")
+    def schedules(block: int) -> _Schedules:
+        return _schedules(
+            scenario,
+            seed_key,
+            np.uint32(block),
+            groups=GROUPS,
+            los_ranges_only=id == "los-only",
+            differentiable=differentiable,
+        )
 
     def estimate_from(group_means: Array) -> Estimate:
         P, spread = deviations(group_means)
         return Estimate(P, P[:, index, index].sum(-1), spread[:, :, index, index].sum(-1) + from_tracks)
 
     index = np.array(scenario.motion.position_index)
-    few = schedules(0)[:, :SCHEDULES_FOR_GEOMETRY]
+    few = _Schedules(schedules(0).information[:, :SCHEDULES_FOR_GEOMETRY], None)
     tracks = blocks or 1  # blocks of tracks: doubled until they cause at most half of the permitted error
     while True:
         G = geometry(tracks)
-        from_tracks = _geometry_deviations(scenario, few, G)
-        if blocks is not None or not expectation.random or traced(scenario) or tracks >= MAX_BLOCKS:
+        from_tracks = _geometry_deviations(scenario, few.information, G)
+        if blocks is not None or not expectation.random or differentiable or tracks >= MAX_BLOCKS:
             break
         P = _group_means(scenario, few, G.mean(0)).mean(0)
         if relative_error(Estimate(P, P[:, index, index].sum(-1), from_tracks)) <= target / 2:
@@ -134,7 +159,7 @@ def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, prog
         lambda block: _group_means(scenario, schedules(block), G_mean),
         estimate_from,
         rtol=target,
-        blocks=1 if traced(scenario, expectation) else blocks,
+        blocks=blocks or (1 if differentiable else None),
         samples_per_block=GROUPS * SCHEDULES,
         progress=progress,
     )

@@ -24,12 +24,14 @@ class Estimate(NamedTuple):
     replicates: Float[Array, "groups times"]
 
 
-def check_rtol(rtol: float | None, samples: int | None) -> float:
+def check_rtol(rtol: float | None, samples: int | None, is_traced: bool = False) -> float:
     """The precision to aim for; an InputError where it cannot be reached by any number of draws."""
     if samples is not None and (int(samples) != samples or samples < 1):
         raise InputError(f"the number of samples is {samples}", "Give a whole number of at least 1")
     if rtol is None:
         return DEFAULT_RTOL
+    if is_traced:
+        raise InputError("rtol is given, but no error can be looked at while JAX traces the bound", "Give samples")
     if not 0 < rtol < 1:
         raise InputError(f"rtol is {rtol}", "Give a relative standard error between 0 and 1, for example 1e-3")
     return float(rtol)

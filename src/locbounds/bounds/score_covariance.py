@@ -29,7 +29,7 @@ from locbounds.axes import Array, Bool, Float
 from locbounds.blocks import Stream, block_key
 from locbounds.noise import Noise
 from locbounds.scenario import Link, Scenario
-from locbounds.simulation import draw_noise, draw_sight
+from locbounds.simulation import draw_noise, draw_sight, equal_weights, likelihood_ratios
 
 
 class NoiseProcess(NamedTuple):
@@ -64,9 +64,16 @@ def mode_information(process: NoiseProcess) -> Float[Array, " modes"]:
     return jnp.stack([jnp.asarray(noise.information()) for noise in process.noises])
 
 
-@partial(jax.jit, static_argnames=("groups", "paths", "window"))
+@partial(jax.jit, static_argnames=("groups", "paths", "window", "differentiable"))
 def score_covariance_increments(
-    process: NoiseProcess, seed: Array, block: Array, *, groups: int, paths: int, window: int
+    process: NoiseProcess,
+    seed: Array,
+    block: Array,
+    *,
+    groups: int,
+    paths: int,
+    window: int,
+    differentiable: bool = False,
 ) -> Float[Array, "groups steps window window"]:
     """Group means of the increments ``C(., .; k) - C(., .; k-1)``, entries by age relative to the horizon k.
 
@@ -78,6 +85,8 @@ def score_covariance_increments(
         Which draws: ``groups * paths`` noise paths.
     groups, paths, window
         Groups kept apart, paths in each, ages kept.
+    differentiable
+        Weigh the paths with their likelihood ratios, so that derivatives with respect to the chain are unbiased.
 
     Notes
     -----
@@ -92,15 +101,20 @@ def score_covariance_increments(
     s = jnp.where(reported, jnp.stack([law.score(w) for law in process.noises], -1), 0.0)
     known = mode_probabilities(process) @ mode_information(process) * process.reports
 
-    def mean(x: Array) -> Array:  # over the paths of each group
-        return x.reshape(groups, paths, *x.shape[1:]).mean(1)
+    weights = None  # of the paths in each group, by step
+    if differentiable:
+        weights = equal_weights(likelihood_ratios(sight, process.start, process.transitions), groups)
 
     def step(carry, inputs):
         p, d = carry  # [n, modes], [n, modes-1, window]: d[., r, i] at age i, given r_{k-1} = r + 1
-        T, log_l, s, known = inputs
-        predicted = p @ T
-        l = jnp.exp(log_l - jnp.max(jnp.where(predicted > 0, log_l, -jnp.inf), -1, keepdims=True))
-        joint = p[:, :, None] * T * jnp.where(predicted > 0, l, 0.0)[:, None, :]
+        T, log_l, s, known, weight = inputs
+
+        def mean(x: Array) -> Array:  # over the paths of each group
+            x = x.reshape(groups, paths, *x.shape[1:])
+            return x.mean(1) if weight is None else jnp.einsum("gn,gn...->g...", weight, x)
+
+        log_l = jnp.where(p @ T > 0, log_l, -jnp.inf)  # a mode that cannot be has no say in the scale
+        joint = p[:, :, None] * T * jnp.exp(log_l - jnp.max(log_l, -1, keepdims=True))[:, None, :]
         joint = joint / joint.sum((1, 2), keepdims=True)
         p_new, q = joint.sum(1), joint.sum(2)
         s_with = jnp.sum(joint * s[:, None, :], -1)  # E[s_k ; r_{k-1} = r | w_{1:k}]
@@ -111,7 +125,8 @@ def score_covariance_increments(
         c = s_with - a[:, None] * q
         cross = -mean(jnp.sum(c[:, 1:, None] * older, 1))
         xi = jnp.sum((q - p)[:, 1:, None] * older, 1).reshape(groups, paths, window - 1)
-        old = jnp.einsum("gni,gnj->gij", xi, xi) / paths
+        weighted = xi / paths if weight is None else xi * weight[:, :, None]
+        old = jnp.einsum("gni,gnj->gij", weighted, xi)
         top = jnp.concatenate([newest[:, None, None], cross[:, None, :]], -1)
         increment = jnp.concatenate([top, jnp.concatenate([cross[:, :, None], old], -1)], -2)
 
@@ -121,5 +136,5 @@ def score_covariance_increments(
         return (p_new, jnp.concatenate([(s[:, 1:] - s[:, :1])[:, :, None], kept], -1)), increment
 
     first = (jnp.broadcast_to(jnp.asarray(process.start), (n, modes)), jnp.zeros((n, modes - 1, window)))
-    _, increments = jax.lax.scan(step, first, (process.transitions, log_l, s, known))
+    _, increments = jax.lax.scan(step, first, (process.transitions, log_l, s, known, weights))
     return jnp.moveaxis(increments, 0, 1)

@@ -42,7 +42,8 @@ class ConstantVelocity(Motion):
     discrete: bool = eqx.field(static=True)
 
     def __init__(self, intensity, dim: int = 2, *, discrete: bool = False):
-        self.intensity = intensity if traced(intensity) else np.broadcast_to(float64(intensity), (dim,))
+        broadcast = jnp.broadcast_to if traced(intensity) else np.broadcast_to
+        self.intensity = broadcast(float64(intensity), (dim,))
         self.axes = dim
         self.discrete = discrete
 

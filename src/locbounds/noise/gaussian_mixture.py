@@ -4,7 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.scipy.special import logsumexp
+from jax.scipy.special import logsumexp, ndtr
 
 from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError
@@ -13,6 +13,26 @@ from locbounds.precision import float64, traced
 
 _BREAKS = np.array([-10, -8, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6, 8, 10.0])  # in deviations of a component
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+
+
+@jax.custom_jvp
+def _quantile(w: Array, weights: Array, means: Array, stds: Array) -> Array:
+    """The draw ``w`` itself; it moves with the parameters so that its probability ``F(w)`` stays what it is."""
+    return w
+
+
+@_quantile.defjvp
+def _quantile_jvp(primals, tangents):
+    w, weights, means, stds = primals
+    _, d_weights, d_means, d_stds = tangents
+    u = (w[..., None] - means) / stds
+    log_density = -0.5 * u**2 - jnp.log(stds) - 0.5 * jnp.log(2 * jnp.pi)
+    share = jax.nn.softmax(log_density + jnp.log(weights), axis=-1)
+    density = jnp.exp(logsumexp(log_density + jnp.log(weights), axis=-1))
+    moves = jnp.sum(share * (d_means + u * d_stds), -1)  # -dF / density, its part by means and deviations
+    # the shares' part; with F or 1 - F, whichever is small, as the changes of the weights sum to zero
+    tail = jnp.where(w[..., None] < jnp.sum(weights * means), ndtr(u), -ndtr(-u))
+    return w, tangents[0] + moves - jnp.sum(tail * d_weights, -1) / density
 
 
 class GaussianMixture(Noise):
@@ -76,7 +96,8 @@ class GaussianMixture(Noise):
     def sample(self, key: Array, shape: tuple[int, ...]) -> Float[Array, "..."]:
         pick, draw = jax.random.split(key)
         c = jnp.searchsorted(jnp.cumsum(self.weights)[:-1], jax.random.uniform(pick, shape), side="right")
-        return jnp.asarray(self.means)[c] + jnp.asarray(self.stds)[c] * jax.random.normal(draw, shape)
+        w = jnp.asarray(self.means)[c] + jnp.asarray(self.stds)[c] * jax.random.normal(draw, shape)
+        return _quantile(jax.lax.stop_gradient(w), *map(jnp.asarray, (self.weights, self.means, self.stds)))
 
     def information(self) -> Scalar:
         edges = jnp.sort((self.means[:, None] + self.stds[:, None] * _BREAKS).ravel())

@@ -4,10 +4,12 @@ from abc import abstractmethod
 from typing import Any
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float, ndarray
+from locbounds.axes import Array, Float
 from locbounds.errors import InputError
+from locbounds.precision import traced
 
 SUM_TOLERANCE = 1e-9  # probabilities typed in decimal sum to one within rounding
 
@@ -34,13 +36,20 @@ def check_probabilities(rows: Any, what: str) -> None:
         )
 
 
-def stationary(transition: ndarray) -> ndarray:
+def stationary(transition: Float[Array, "modes modes"]) -> Float[Array, " modes"]:
     """Stationary law of a transition matrix; the uniform law where it is not unique.
+
+    While JAX traces the matrix, its law is taken to be unique.
 
     >>> stationary(np.array([[0.9, 0.1], [0.3, 0.7]])).round(3).tolist()
     [0.75, 0.25]
     """
     n = len(transition)
+    if traced(transition):
+        ones = jnp.ones((n, n))  # pi (I - T + ones) = (1, ..., 1), as pi (I - T) = 0 and pi sums to one
+        return jnp.linalg.solve((jnp.eye(n) - transition + ones).T, jnp.ones(n))
+    if not np.all(np.isfinite(transition)):
+        return np.full(n, 1 / n)  # the chain itself is refused
     equations = np.vstack([transition.T - np.eye(n), np.ones(n)])
     if np.linalg.matrix_rank(equations) < n:
         return np.full(n, 1 / n)

@@ -40,8 +40,9 @@ class DwellSight(Sight):
     def __init__(self, start, dwell_s):
         self.dwell_s = dwell_s
         if start is None:
-            start = jnp.asarray(dwell_s) / jnp.sum(jnp.asarray(dwell_s)) if traced(dwell_s) else self.dwell_s
-            start = start if traced(start) else float64(dwell_s) / np.sum(float64(dwell_s))
+            dwell = float64(dwell_s)
+            usable = traced(dwell) or np.all((dwell > 0) & (dwell < np.inf))
+            start = dwell / dwell.sum() if usable else np.array([0.5, 0.5])  # what is not usable is refused below
         self.start = start
 
     def __check_init__(self):

@@ -68,7 +68,7 @@ class MarkovSight(Sight):
         """
         if traced(stay):
             los, nlos = jnp.broadcast_to(jnp.asarray(stay), (2,))
-            return cls(np.array([0.5, 0.5]) if start is None else start, jnp.array([[los, 1 - los], [1 - nlos, nlos]]))
+            return cls(start, jnp.array([[los, 1 - los], [1 - nlos, nlos]]))
         los, nlos = np.broadcast_to(float64(stay), (2,))
         return cls(start, [[los, 1 - los], [1 - nlos, nlos]])
 
