@@ -218,6 +218,7 @@ def known_sight(
 def separated(id, scenario, rtol, samples, seed, expectation, window, progress) -> Result:
     """The engine: blocks of score covariances and geometries until window and precision suffice."""
     expectation, verdict = prepare(id, scenario, expectation)
+    scenario = scenario.anonymous()
     differentiable = traced(scenario, expectation)
     rtol_target = check_rtol(rtol, samples, differentiable)
     if window is not None and (int(window) != window or window < 1):

@@ -119,6 +119,7 @@ def _geometry_deviations(scenario, info, G) -> Float[Array, "groups times"]:
 def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, progress) -> Result:
     """The common part of enumer and los-only, which differ in the information of NLOS ranges and in the verdict."""
     expectation, verdict = prepare(id, scenario, expectation)
+    scenario = scenario.anonymous()
     differentiable = traced(scenario, expectation)
     target = check_rtol(rtol, samples, differentiable)
     seed_key = np.uint32(check_seed(seed))
