@@ -97,7 +97,7 @@ def evaluate_on(
         errors.append(position_error(scenario, mean, part.states))
         if mean.shape[-1] == n:
             e = mean - part.states
-            covariance += np.einsum("rki,rkj->kij", e, e) / runs
+            covariance += np.matmul(e.transpose(1, 2, 0), e.transpose(1, 0, 2)) / runs
             if spread is not None:
                 nees.append(normalised_square(e, spread))
         else:

@@ -36,6 +36,8 @@ class Method(NamedTuple):
         Citation keys of docs/references.bib.
     assumptions
         Predicates on a scenario.
+    conditions
+        Under which condition it is valid at all.
     """
 
     id: str
@@ -48,10 +50,11 @@ class Method(NamedTuple):
     fails: str
     references: tuple[str, ...]
     assumptions: tuple[Assumption, ...] = ()
+    conditions: tuple[str, ...] = ()
 
     def verdict(self, scenario: Scenario, conditions: tuple[str, ...] = ()) -> Verdict:
         """Whether it applies to a scenario."""
-        return judge(self.assumptions, scenario, grounds=self.grounds, conditions=conditions)
+        return judge(self.assumptions, scenario, grounds=self.grounds, conditions=self.conditions + conditions)
 
 
 METHODS: dict[str, Method] = {
@@ -109,6 +112,7 @@ METHODS: dict[str, Method] = {
             "Not a bound for filters that use NLOS ranges; right where the NLOS excess is unknown and arbitrary.",
             ("qi2006",),
             (SMOOTH_NOISE, LOS_AND_NLOS),
+            ("estimators that discard NLOS ranges, or an NLOS excess about which nothing is known",),
         ),
         Method(
             "imm-ekf",
@@ -183,3 +187,45 @@ def load(entry: Method) -> Any:
     """
     module, _, name = entry.function.partition(":")
     return getattr(importlib.import_module(module), name)
+
+
+def describe(entry: Method) -> dict[str, Any]:
+    """What a method is, sees and assumes, when it fails and whom to cite, as plain data.
+
+    >>> describe(method("enumer"))["sees"]
+    ['ranges', 'sight']
+    """
+    return {
+        "id": entry.id,
+        "name": entry.name,
+        "kind": entry.kind,
+        "summary": entry.summary,
+        "sees": sorted(entry.sees),
+        "assumes": [*entry.conditions, *entry.grounds, *(a.text for a in entry.assumptions)],
+        "fails": entry.fails,
+        "cite": list(entry.references),
+    }
+
+
+def explain(id: str) -> str:
+    """What a bound or filter assumes, when it misleads, and whom to cite.
+
+    Parameters
+    ----------
+    id
+        Id of a method, for example ``bcrb``.
+
+    Raises
+    ------
+    InputError
+        If the id is unknown; the nearest known one is named.
+
+    Examples
+    --------
+    >>> print(explain("bcrb").splitlines()[0])
+    BCRB (bcrb), a bound
+    """
+    entry = describe(method(id))
+    lines = [f"{entry['name']} ({entry['id']}), a {entry['kind']}", entry["summary"], ""]
+    lines += [f"sees     {', '.join(entry['sees'])}", *(f"assumes  {text}" for text in entry["assumes"])]
+    return "\n".join([*lines, f"careful  {entry['fails']}", f"cite     {', '.join(entry['cite'])}"])

@@ -149,6 +149,16 @@ class Scenario(eqx.Module):
         fields = {name: getattr(self, name) for name in ("title", "times", "motion", "prior", "links")}
         return Scenario(**(fields | changes))
 
+    def anonymous(self) -> "Scenario":
+        """The same scenario without title and names: kernels compiled for one serve all of the same shape.
+
+        >>> import locbounds as lb
+        >>> lb.papers.fritsche2013.scenario().anonymous().links[2].name
+        '2'
+        """
+        links = [Link(str(m), a.measurement, a.sight, a.noises, a.reports) for m, a in enumerate(self.links)]
+        return self.replace(title="", links=links)
+
     def with_times(self, time_s: Float[Array, " times"]) -> "Scenario":
         """The same scenario at other times; which steps had reports is forgotten."""
         links = [Link(a.name, a.measurement, a.sight, a.noises) for a in self.links]

@@ -103,9 +103,11 @@ def equal_weights(ratios: Float[Array, "steps runs"], groups: int) -> Float[Arra
 
 
 def draw_noise(key: Array, noises: tuple[Noise, ...], sight: Int[Array, "*n"]) -> Float[Array, "*n"]:
-    """Noise given the sight of every sample; differentiable in the noises."""
-    keys = jax.random.split(key, len(noises))
-    draws = [noise.sample(k, sight.shape) for noise, k in zip(noises, keys, strict=True)]
+    """Noise given the sight of every sample; differentiable in the noises.
+
+    Every mode draws from the same key and one of the draws is used, so that equal random numbers are made only once.
+    """
+    draws = [noise.sample(key, sight.shape) for noise in noises]
     w = draws[0]
     for mode, draw in enumerate(draws[1:], start=1):
         w = jnp.where(sight == mode, draw, w)
@@ -166,8 +168,9 @@ def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
     if runs < 1 or int(runs) != runs:
         raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 1")
     check_seed(seed)
+    model = scenario.anonymous()
     blocks = [
-        _draw_block(scenario, np.uint32(seed), np.uint32(b), RUNS_PER_BLOCK) for b in range(-(-runs // RUNS_PER_BLOCK))
+        _draw_block(model, np.uint32(seed), np.uint32(b), RUNS_PER_BLOCK) for b in range(-(-runs // RUNS_PER_BLOCK))
     ]
     if traced(scenario):
         return jax.tree.map(lambda *parts: jnp.concatenate(parts)[:runs], *blocks)

@@ -103,7 +103,7 @@ def test_against_the_sum_over_all_mode_sequences():
         return P[0, 0] + P[1, 1]
 
     groups = np.split(score, 32)  # jackknife
-    left_out = [position_mse(np.concatenate(groups[:g] + groups[g + 1 :])) for g in range(32)]
+    left_out = np.array([position_mse(np.concatenate(groups[:g] + groups[g + 1 :])) for g in range(32)])
     enumerated, stderr = position_mse(score), np.sqrt(31 / 32 * np.sum(np.square(left_out - np.mean(left_out))))
     bound = lb.bcrb(scenario, samples=32768, window=4)
     error = np.hypot(stderr, bound.position_mse[-1] * 2 * bound.relative_stderr())

@@ -142,6 +142,7 @@ def bcrb_algorithm1(scenario: Scenario, *, samples: int = 2048, seed: int = 0) -
         raise InputError("Algorithm 1 cannot be transformed by JAX", "Use locbounds.bcrb, which can")
     check_rtol(None, samples)
     expectation, verdict = prepare("bcrb", scenario, Prior())
+    scenario = scenario.anonymous()
     seed_key = np.uint32(check_seed(seed))
     modes = int(np.prod([len(link.noises) for link in scenario.links]))
     if modes > MAX_MODES:

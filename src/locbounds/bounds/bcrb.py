@@ -45,7 +45,7 @@ def _distinct(processes: list[NoiseProcess]) -> list[int]:
 def _geometry(
     scenario, expectation, seed, block, *, groups, window, sharing
 ) -> Float[Array, "groups processes steps window space space"]:
-    """Group means of ``grad h(x_n) grad h(x_{n-lag})^T`` for every step n and lag, over links that share noise."""
+    """Group means of ``grad h(x_n) grad h(x_{n-lag})^T`` by step n and lag, summed over links that share noise."""
     paths = groups * TRACKS if expectation.random else 1
     u = directions(scenario, expectation, block_key(seed, Stream.TRACKS, block), paths)
     u = u.reshape(u.shape[0], groups if expectation.random else 1, -1, *u.shape[2:])
@@ -142,8 +142,9 @@ def bcrb(
     Result
         ``covariance`` [steps+1, state, state] is the bound on the mean square error matrix of any estimator of x_k
         from z_1..z_k. ``diagnostics["truncation"]`` is the relative change of the position RMSE, at the worst step,
-        when the window is shortened by a quarter: an estimate from above of the error made by truncating at the
-        window itself, since the entries left out decay geometrically; NaN where the window was given.
+        when the window is shortened by a quarter. It indicates the error made by truncating at the window itself, and
+        exceeds it where the entries left out decay quickly; it is no guarantee, and the error may have either sign.
+        NaN where the window was given.
 
     Raises
     ------
@@ -217,6 +218,7 @@ def known_sight(
 def separated(id, scenario, rtol, samples, seed, expectation, window, progress) -> Result:
     """The engine: blocks of score covariances and geometries until window and precision suffice."""
     expectation, verdict = prepare(id, scenario, expectation)
+    scenario = scenario.anonymous()
     differentiable = traced(scenario, expectation)
     rtol_target = check_rtol(rtol, samples, differentiable)
     if window is not None and (int(window) != window or window < 1):

@@ -11,14 +11,11 @@ from locbounds.scenario import Scenario
 from locbounds.verdict import Status, Verdict
 
 
-def prepare(
-    id: str, scenario: Scenario, expectation: Expectation | None, conditions: tuple[str, ...] = ()
-) -> tuple[Expectation, Verdict]:
+def prepare(id: str, scenario: Scenario, expectation: Expectation | None) -> tuple[Expectation, Verdict]:
     """The expectation to use and the verdict; a RefusedError before any Monte Carlo where an assumption fails."""
     expectation = Prior() if expectation is None else expectation
     expectation.check(scenario)
-    if expectation.label:
-        conditions = (*conditions, f"conditional on {expectation.label}")
+    conditions = (f"conditional on {expectation.label}",) if expectation.label else ()
     verdict = method(id).verdict(scenario, conditions)
     if verdict.status is Status.REFUSED:
         raise RefusedError(f"{id} does not apply: {'; '.join(verdict.reasons)}", f"See: locbounds explain {id}")

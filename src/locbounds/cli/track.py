@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from locbounds.scenario import Scenario
 
 JOINT_ANCHORS = 6  # up to here the IMM over all joint modes is the default filter, beyond it the factorised one
+LOG_RTOL = 1e-2  # along measured tracks, where nothing is known to better than some per cent
 BIN_S = 10.0  # width of the time bins for errors pooled over measured tracks
 
 
@@ -169,7 +170,7 @@ def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) 
             log,
             bounds=[registry.load(entry) for entry in bounds],
             filters=filters,
-            rtol=rtol,
+            rtol=LOG_RTOL if rtol is None else rtol,
             seed=seed,
             announce=say,
         )

@@ -86,6 +86,23 @@ def on_track(scenario: Scenario, track: Track) -> Scenario:
     return scenario.with_times(track.time_s - track.time_s[0]).with_reports(track.reports)
 
 
+def _padded(track: Track, steps: int) -> Track:
+    """The track with steps without any range added at its end.
+
+    Neither a filter nor a filtering bound at step k depends on later steps, so that tracks of one length, which share
+    compiled kernels, give the same numbers.
+    """
+    more = steps - track.steps
+    time_s, place = np.asarray(track.time_s), np.asarray(track.position_m)
+    tick = float(np.median(np.diff(time_s)))
+    return Track(
+        track.name,
+        np.concatenate([time_s, time_s[-1] + tick * np.arange(1, more + 1)]),
+        np.concatenate([track.ranges_m, np.full((more, track.ranges_m.shape[1]), np.nan)]),
+        np.concatenate([place, np.repeat(place[-1:], more, axis=0)]),
+    )
+
+
 def along_tracks(
     scenario: Scenario,
     log: RangeLog,
@@ -131,21 +148,26 @@ def along_tracks(
         )
     say = announce or (lambda what: None)
     squares: dict[tuple[str, str, str], list[Any]] = {}
+    longest = max(track.steps for track in log.tracks)
     for track in log.tracks:
-        model = on_track(scenario, track)
-        truth = np.asarray(track.position_m)
+        steps = track.steps
+        long = _padded(track, longest)
+        model = on_track(scenario, long)
+        truth = np.asarray(long.position_m)
         for bound in bounds:
             say(f"{track.name}: {getattr(bound, '__name__', bound)}")
             result = bound(model, rtol=rtol, seed=seed, expectation=AlongTrack(truth, label=LABEL))
-            squares.setdefault((result.id, result.name, "bound"), []).append(np.asarray(result.position_mse))
+            squares.setdefault((result.id, result.name, "bound"), []).append(
+                np.asarray(result.position_mse)[: steps + 1]
+            )
         states = np.zeros((1, len(truth), scenario.motion.state_size))
         states[..., list(scenario.motion.position_index)] = truth
         for filter in filters:
             name = getattr(filter, "name", getattr(filter, "__name__", "own filter"))
             say(f"{track.name}: {name}")
-            mean, _ = estimates(filter, model, track.ranges_m[None], None, seed)
+            mean, _ = estimates(filter, model, long.ranges_m[None], None, seed)
             key = (getattr(filter, "id", "own"), name, "filter")
-            squares.setdefault(key, []).append(position_error(model, mean, states)[0] ** 2)
+            squares.setdefault(key, []).append(position_error(model, mean, states)[0, : steps + 1] ** 2)
     time_s = tuple(track.time_s - track.time_s[0] for track in log.tracks)
     tracks = tuple(track.name for track in log.tracks)
     return [AlongTracks(*key, tracks, time_s, tuple(value)) for key, value in squares.items()]

@@ -41,9 +41,8 @@ class DwellSight(Sight):
         self.dwell_s = dwell_s
         if start is None:
             dwell = float64(dwell_s)
-            start = (
-                dwell / dwell.sum() if traced(dwell) or np.all((dwell > 0) & (dwell < np.inf)) else [0.5, 0.5]
-            )  # refused below
+            usable = traced(dwell) or np.all((dwell > 0) & (dwell < np.inf))
+            start = dwell / dwell.sum() if usable else np.array([0.5, 0.5])  # what is not usable is refused below
         self.start = start
 
     def __check_init__(self):

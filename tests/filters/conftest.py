@@ -1,0 +1,3 @@
+from filter_scenarios import paper
+
+__all__ = ["paper"]
