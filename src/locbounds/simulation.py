@@ -168,6 +168,8 @@ def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
     if runs < 1 or int(runs) != runs:
         raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 1")
     check_seed(seed)
+    for link in scenario.links:
+        link.sight.transitions(scenario.times.intervals)  # raises where chain and times do not fit, as jit does not
     model = scenario.anonymous()
     blocks = [
         _draw_block(model, np.uint32(seed), np.uint32(b), RUNS_PER_BLOCK) for b in range(-(-runs // RUNS_PER_BLOCK))

@@ -163,10 +163,6 @@ def test_it_never_exceeds_the_known_mode_information(table):
     assert np.linalg.eigvalsh(C).min() > 0
 
 
-def test_a_shorter_window_keeps_the_same_newest_entries(table):
-    np.testing.assert_allclose(increments(window=2), table[..., :2, :2], atol=ROUNDING)
-
-
 def test_the_same_seed_gives_the_same_bits_and_another_one_other_draws(table):
     assert np.array_equal(increments(), table)
     assert not np.array_equal(increments(seed=1), table)
