@@ -1,5 +1,12 @@
 """What every test runs under. Nothing here switches JAX to double precision: the library has to do that itself."""
 
+import os
+from pathlib import Path
+
+# compiled kernels outlive the modules that share them; before JAX is imported
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parent / ".pytest_cache" / "kernels"))
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.2")
+
 import jax
 import matplotlib
 import pytest

@@ -33,6 +33,7 @@ nb_execution_raise_on_error = False  # a warning, which fails the build and, unl
 nb_execution_timeout = 300
 nb_execution_show_tb = True
 nb_merge_streams = True
+nb_render_markdown_format = "gfm"  # tables that a cell makes
 os.environ.setdefault("LOCBOUNDS_DATA", str(datasets.folder()))  # the kernels that execute the pages inherit it
 if datasets.find("wifi_rtt_walks") is None:  # a page that needs measured data is shown without its output
     nb_execution_excludepatterns = ["range-log.md"]

@@ -9,9 +9,7 @@ CHAINS = ([[0.9, 0.1], [0.3, 0.7]], [[0.6, 0.4], [0.05, 0.95]], [[0.8, 0.2], [0.
 STARTS = ([0.7, 0.3], [0.2, 0.8], [0.5, 0.5])
 
 
-def awkward(
-    dim: int, *, links: int = 3, outliers: bool = False, discrete: bool = False, steps: int = 12
-) -> lb.Scenario:
+def awkward(dim: int, *, links: int = 3, outliers: bool = False, discrete: bool = False) -> lb.Scenario:
     """Asymmetric chains, noises that differ, a correlated prior; everything that a transposed matrix would show."""
     rng = np.random.default_rng(5)
     root = rng.normal(size=(2 * dim, 2 * dim)) * np.repeat([20.0, 1.0], dim)[:, None]
@@ -23,7 +21,7 @@ def awkward(
 
     return lb.Scenario(
         title="awkward",
-        times=lb.Times.uniform(step_s=0.7, steps=steps),
+        times=lb.Times.uniform(step_s=0.7, steps=12),
         motion=lb.ConstantVelocity(0.4, dim=dim, discrete=discrete),
         prior=lb.GaussianPrior(np.repeat([10.0, 2.0], dim), root @ root.T),
         links=[
@@ -33,9 +31,9 @@ def awkward(
     )
 
 
-def with_gaps(z: np.ndarray) -> np.ndarray:
+def with_gaps(measurements) -> np.ndarray:
     """The measurements with a few missing, and one step without any."""
-    z = z.copy()
+    z = np.array(measurements)
     z[:, 2] = np.nan
     z[:, 4, 0] = z[:, 5, -1] = np.nan
     return z

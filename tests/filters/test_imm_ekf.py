@@ -32,7 +32,7 @@ def test_reproduces_the_textbook(options):
     mean, covariance = textbook_tracks(scenario, z)
     ours = ImmEkf()(scenario, z)
     np.testing.assert_allclose(ours.mean, mean, atol=ROUNDING)
-    np.testing.assert_allclose(ours.covariance, covariance, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(np.asarray(ours.covariance), covariance, rtol=1e-9, atol=1e-7)
     assert ours.mean.dtype == np.float64
 
 
@@ -52,6 +52,8 @@ def test_filterpy_imm_of_ekfs(paper):
     z = draws.measurements[:2]
 
     class RangeEkf(kalman.ExtendedKalmanFilter):
+        bias: np.ndarray = np.zeros(3)
+
         def update(self, z):
             def H(x):
                 return textbook.ranges(x[:2], model.anchors, 4)[1]
@@ -66,8 +68,8 @@ def test_filterpy_imm_of_ekfs(paper):
         filters = []
         for joint in np.ndindex(2, 2, 2):
             f = RangeEkf(dim_x=4, dim_z=3)
-            f.x, f.P, f.F, f.Q = model.m0.copy(), model.P0.copy(), model.F[0], model.Q[0]
-            f.bias = model.means[range(3), joint, 0]
+            f.x, f.P, f.F, f.Q = model.m0.copy(), model.P0.copy(), model.F[0], model.Q[0]  # pyright: ignore
+            f.bias = np.asarray(model.means[range(3), joint, 0])
             f.R = np.diag(model.variances[range(3), joint, 0])
             filters.append(f)
         T, start = np.ones((1, 1)), np.ones(1)
@@ -99,7 +101,7 @@ def test_a_known_sight_makes_it_the_oracle():
     ours = ImmEkf()(known, draws.measurements)
     oracle = OracleEkf()(scenario, draws.measurements, 0, draws.sight)
     np.testing.assert_allclose(ours.mean, oracle.mean, atol=ROUNDING)
-    np.testing.assert_allclose(ours.covariance, oracle.covariance, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(np.asarray(ours.covariance), np.asarray(oracle.covariance), rtol=1e-9, atol=1e-7)
 
 
 def test_the_order_of_the_anchors_does_not_matter(paper):
@@ -132,7 +134,7 @@ def test_without_any_range_it_predicts():
     for _ in range(scenario.steps):
         x, P = F @ x, F @ P @ F.T + Q
     np.testing.assert_allclose(estimates.mean[:, -1], [x, x], rtol=1e-12)
-    np.testing.assert_allclose(estimates.covariance[:, -1], [P, P], rtol=1e-12)
+    np.testing.assert_allclose(np.asarray(estimates.covariance)[:, -1], [P, P], rtol=1e-12)
 
 
 def test_a_track_does_not_depend_on_its_company(paper):

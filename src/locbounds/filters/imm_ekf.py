@@ -14,7 +14,14 @@ from locbounds.errors import InputError
 from locbounds.filters.estimates import Estimates
 from locbounds.filters.lowering import Model, check_measurements, estimates, lower, transition_pattern
 from locbounds.filters.over_tracks import over_tracks
-from locbounds.filters.range_update import correct, corrected, direction, no_correction, relative_weights
+from locbounds.filters.range_update import (
+    correct,
+    correct_in_plane,
+    corrected,
+    direction,
+    no_correction,
+    relative_weights,
+)
 from locbounds.filters.tracks_last import (
     Pattern,
     apply,
@@ -59,14 +66,12 @@ def imm_ekf(model: Model, z: Array, *, kinds: Pattern, covariance: bool) -> tupl
     -------
     mean [steps, state, tracks], covariance [steps, state, state, tracks] or None.
     """
-    links, modes, _ = model.means.shape
+    links, modes, components = model.means.shape
     dim, n, tracks = model.anchors.shape[1], len(model.m0), z.shape[-1]
     joint = np.array(list(itertools.product(range(modes), repeat=links)))  # [joint modes, links], in the order of kron
     rows = len(joint)
-    pick = np.arange(links)[:, None], joint.T
-    noises = [
-        jnp.moveaxis(jnp.asarray(a)[pick], -1, 1)[..., None] for a in (model.weights, model.means, model.variances)
-    ]
+    law = model.weights, model.means, model.variances
+    noises = [[jnp.asarray(a)[link][joint[:, link]].T[..., None] for a in law] for link in range(links)]
 
     def mix(moments: Any, transitions: Array) -> Any:
         """Moments of every mode after a transition, and in one more row the sums over all modes."""
@@ -83,13 +88,16 @@ def imm_ekf(model: Model, z: Array, *, kinds: Pattern, covariance: bool) -> tupl
         x = apply(F, kinds, [a + b for a, b in zip(centre, d, strict=True)])
         P = congruence(F, kinds, {(i, j): S2[i, j][:rows] * inverse - d[i] * d[j] for i, j in S2})
         P = {(i, j): P[i, j] + Q[i, j] for i, j in P}
-        z, x, P, centre = materialise((z, x, P, apply(F, kinds, m)))
+        z, x, P, centre = materialise(([z[a] for a in range(links)], x, P, apply(F, kinds, m)))
 
         position, P_pp = x[:dim], {pair: P[pair] for pair in upper(dim)}
-        correction = no_correction(x[0], dim)
-        for link in range(links):  # unrolled: there are few, and XLA fuses across them
-            noise = tuple(a[link] for a in noises)
-            correction = correct(correction, P_pp, direction(position, model.anchors[link]), z[link], noise)
+        predictions = [direction(position, model.anchors[link]) for link in range(links)]
+        if dim == 2 and components == 1:
+            correction = correct_in_plane(P_pp, predictions, z, noises)
+        else:
+            correction = no_correction(x[0], dim)
+            for link in range(links):  # unrolled: there are few, and XLA fuses across them
+                correction = correct(correction, P_pp, predictions[link], z[link], noises[link])
         mu = relative_weights(c[:rows] / c_total, correction)
         x, P = corrected(x, P, correction)
         d = materialise([a - b for a, b in zip(x, centre, strict=True)])

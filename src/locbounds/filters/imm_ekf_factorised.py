@@ -215,7 +215,7 @@ class FactorisedImmEkf(eqx.Module):
             model,
             (z,),
             (model.m0, model.P0),
-            hypotheses=2 * model.means.shape[1],
+            hypotheses=8 * model.means.shape[1],
             kinds=transition_pattern(model),
             covariance=self.covariance,
         )

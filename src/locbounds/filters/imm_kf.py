@@ -215,7 +215,7 @@ class ImmKf(eqx.Module):
             model,
             (z,),
             (model.m0, model.P0),
-            hypotheses=len(scenario.links) * model.means.shape[1],
+            hypotheses=8 * model.means.shape[1],
             weighted=self.weighted,
             covariance=self.covariance,
         )

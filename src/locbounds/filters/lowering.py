@@ -65,10 +65,14 @@ def lower(scenario: Scenario) -> Model:
             f"links have different numbers of sight conditions: {sorted(modes)}",
             "Give every link the same number; a condition may have probability zero",
         )
-    xp = jnp if traced(scenario) else np  # NumPy does not compile each of these small steps
     index = np.array(state_order(scenario))
     mixtures = [[noise.components() for noise in link.noises] for link in scenario.links]
     size = max(len(weights) for row in mixtures for weights, _, _ in row)
+    intervals = scenario.times.intervals
+    motion = scenario.transition, scenario.process_noise
+    chains = [(link.sight.start, link.sight.transitions(intervals)) for link in scenario.links]
+    # NumPy compiles none of these small steps; inside a transformation the pieces may be tracers
+    xp = jnp if traced(scenario, mixtures, motion, chains) else np
 
     def padded(values: Array, filling: float) -> Array:
         return xp.concatenate([xp.asarray(values), xp.full(size - len(values), filling)])
@@ -76,18 +80,18 @@ def lower(scenario: Scenario) -> Model:
     def table(which: int, filling: float) -> Array:
         return xp.stack([xp.stack([padded(mixture[which], filling) for mixture in row]) for row in mixtures])
 
-    intervals = scenario.times.intervals
+    F, Q = (xp.asarray(a)[:, index][:, :, index] for a in motion)
     return Model(
-        F=xp.asarray(scenario.transition)[:, index][:, :, index],
-        Q=xp.asarray(scenario.process_noise)[:, index][:, :, index],
+        F=F,
+        Q=Q,
         m0=scenario.prior.mean[index],
         P0=scenario.prior.covariance[index][:, index],
         anchors=scenario.anchors,
         weights=table(0, 0.0),
         means=table(1, 0.0),
         variances=table(2, 1.0),
-        start=xp.stack([xp.asarray(link.sight.start) for link in scenario.links]),
-        transitions=xp.stack([xp.asarray(link.sight.transitions(intervals)) for link in scenario.links]),
+        start=xp.stack([xp.asarray(start) for start, _ in chains]),
+        transitions=xp.stack([xp.asarray(transitions) for _, transitions in chains]),
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from locbounds.axes import Float, ndarray
+from locbounds.axes import ndarray
 from locbounds.bounds import AlongTrack
 from locbounds.errors import InputError
 from locbounds.evaluation import estimates, position_error
@@ -43,8 +43,8 @@ class AlongTracks:
     name: str
     kind: str
     tracks: tuple[str, ...]
-    time_s: tuple[Float[ndarray, " times"], ...]
-    square_m2: tuple[Float[ndarray, " times"], ...]
+    time_s: tuple[ndarray, ...]
+    square_m2: tuple[ndarray, ...]
 
     def rmse_by_track(self) -> list[float]:
         """Position RMSE of every track over its steps 1..K, in metres."""

@@ -91,6 +91,27 @@ def fit_scenario(
     ------
     InputError
         Naming whatever cannot be estimated from this log.
+
+    Examples
+    --------
+    A log that was simulated, of two anchors whose NLOS ranges are 3 m too long:
+
+    >>> import locbounds as lb
+    >>> noises = (lb.Gaussian(0.0, 0.3), lb.Gaussian(3.0, 1.0))
+    >>> sight = lb.DwellSight(None, [5.0, 5.0])
+    >>> links = [lb.Link(name, lb.Range(place), sight, noises) for name, place in (("a", [0, 0]), ("b", [30, 0]))]
+    >>> prior = lb.GaussianPrior([10, 20, 1, 0], np.diag([1.0, 1.0, 0.1, 0.1]))
+    >>> truth = lb.Scenario("walk", lb.Times.uniform(step_s=0.5, steps=100), lb.ConstantVelocity(0.1), prior, links)
+    >>> draws = lb.simulate(truth, runs=4, seed=0)
+    >>> tracks = [
+    ...     Track(f"walk {i}", truth.times.time_s, z, x[:, :2])
+    ...     for i, (z, x) in enumerate(zip(draws.measurements, draws.states, strict=True))
+    ... ]
+    >>> log = RangeLog(("a", "b"), truth.anchors, tuple(tracks))
+    >>> fitted = fit_scenario(log, outliers=False, psd_m2_s3=0.1)
+    >>> los, nlos = fitted.scenario.links[0].noises
+    >>> abs(float(los.mean)) < 0.1, abs(float(nlos.mean) - 3) < 0.4
+    (True, True)
     """
     if not log.has_truth:
         raise InputError(

@@ -99,7 +99,7 @@ def read_log(
     labels: str | None = None,
     dim: int | None = None,
 ) -> RangeLog:
-    """Read a log of ranges.
+    r"""Read a log of ranges.
 
     Parameters
     ----------
@@ -127,6 +127,18 @@ def read_log(
     ------
     InputError
         Cells that are no numbers, times out of order or twice, unknown anchors, degrees, missing columns, empty files.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as name:
+    ...     folder = Path(name)
+    ...     _ = (folder / "anchors.csv").write_text("anchor_id,x_m,y_m\na,0,0\nb,9,0\n")
+    ...     _ = (folder / "truth.csv").write_text("step,time_s,x_true_m,y_true_m\n0,0,3,4\n1,0.5,3,5\n")
+    ...     _ = (folder / "ranges.csv").write_text("step,anchor_id,range_m\n1,a,6.1\n1,b,8.0\n")
+    ...     log = read_log(folder / "ranges.csv", anchors=folder / "anchors.csv", truth=folder / "truth.csv")
+    >>> log.anchor_names, log.tracks[0].ranges_m.tolist()
+    (('a', 'b'), [[6.1, 8.0]])
     """
     columns = columns or LogColumns()
     tables = {"ranges": CsvTable(ranges, "ranges"), "anchors": CsvTable(anchors, "anchors")}
