@@ -284,3 +284,19 @@ def test_the_window_grows_until_the_truncation_is_small_and_reports_it():
     cut = abs(automatic.mean_position_rmse() / full.mean_position_rmse() - 1)
     assert cut <= 1e-3
     assert abs(short.mean_position_rmse() / full.mean_position_rmse() - 1) > 3e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stay, excess, speed_std", [(0.99, 1.0, 0.1), (0.995, 0.3, 1e-3), (0.999, 1.0, 1e-3)])
+def test_the_reported_truncation_is_no_less_than_the_error_of_the_window(stay, excess, speed_std):
+    """Chains that remember longer than any window tried, on a mobile that hardly moves."""
+    start = lb.GaussianPrior([0.0, 0.0, 0.0, 0.0], np.diag(np.square([10.0, 10.0, speed_std, speed_std])))
+    slow = noise_of(
+        asymmetric(steps=40), sight=lb.MarkovSight.stay(stay), noises=(lb.Gaussian(0.0, 1.0), lb.Gaussian(excess, 1.0))
+    )
+    slow = slow.replace(prior=start, motion=lb.ConstantVelocity(1e-8), times=lb.Times.uniform(step_s=1.0, steps=40))
+    cut = lb.bcrb(slow, rtol=0.9)  # any window will do
+    full = lb.bcrb(slow, samples=cut.provenance.samples, window=40)
+    assert cut.diagnostics["window"] < 40
+    error = np.abs(np.sqrt(cut.position_mse / full.position_mse) - 1).max()
+    assert 3e-3 < error < cut.diagnostics["truncation"]

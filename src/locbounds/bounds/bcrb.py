@@ -93,12 +93,26 @@ def _deviations(scenario, C, G) -> Float[Array, "groups times"]:
 
 
 def _truncation(scenario, C, G) -> float:
-    """Largest relative change of the position RMSE when the window is shortened by a quarter."""
+    """Relative error of the position RMSE at the worst step that is due to the window, extrapolated.
+
+    The changes on shortening the window by a quarter and by a half say how fast they decay with its length:
+    geometrically with a ratio q per quarter, ``half / quarter = (1 + q) / q``, and what was left out makes
+    ``quarter * q / (1 - q)``. Where that is less than the last quarter itself, that quarter is reported; where nothing
+    decays, the last quarter as often as quarters were left out.
+    """
     index = np.array(scenario.motion.position_index)
     C, G = C.mean(0), G.mean(0)
-    kept = np.arange(C.shape[-1]) < -(-3 * C.shape[-1] // 4)
-    full, shorter = (_covariances(scenario, c, G)[:, index, index].sum(-1) for c in (C, C * (kept[:, None] & kept)))
-    return float(jnp.max(jnp.abs(jnp.sqrt(shorter / full) - 1)))
+    window = C.shape[-1]
+
+    def rmse(length):
+        kept = np.arange(window) < length
+        return jnp.sqrt(_covariances(scenario, C * (kept[:, None] & kept), G)[:, index, index].sum(-1))
+
+    full = rmse(window)
+    quarter, half = (float(jnp.max(jnp.abs(rmse(-(-n * window // 4)) / full - 1))) for n in (3, 2))
+    left_out = 4 * (scenario.steps - window) / window
+    beyond = quarter / (half - 2 * quarter) if half > 2 * quarter else np.inf  # q / (1 - q)
+    return quarter * max(1.0, min(beyond, left_out))
 
 
 @double_precision
@@ -133,7 +147,7 @@ def bcrb(
         Where range gradients are taken: ``Prior()`` (default, the Bayesian bound) or ``AlongTrack(positions)``.
     window
         How many steps back a measurement's information correlates with that of others; by default it grows until
-        shortening it by a quarter changes no step by more than ``rtol / 10`` (``rtol`` 1e-3 where none is given).
+        the truncation, as estimated below, is at most ``rtol / 10`` (``rtol`` 1e-3 where none is given).
     progress
         Called with (samples, precision reached, target) after every look.
 
@@ -141,10 +155,10 @@ def bcrb(
     -------
     Result
         ``covariance`` [steps+1, state, state] is the bound on the mean square error matrix of any estimator of x_k
-        from z_1..z_k. ``diagnostics["truncation"]`` is the relative change of the position RMSE, at the worst step,
-        when the window is shortened by a quarter. It indicates the error made by truncating at the window itself, and
-        exceeds it where the entries left out decay quickly; it is no guarantee, and the error may have either sign.
-        NaN where the window was given.
+        from z_1..z_k. ``diagnostics["truncation"]`` is the relative error of the position RMSE, at the worst step,
+        made by truncating at the window, as extrapolated from how the bound changes when the window is shortened by a
+        quarter and by a half. It exceeds the error where the entries left out decay quickly; it is no guarantee, and
+        the error may have either sign. NaN where the window was given.
 
     Raises
     ------
