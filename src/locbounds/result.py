@@ -161,6 +161,11 @@ class Result(eqx.Module):
                 "unknown: the filter may be better than this bound",
                 "Use a bound that assumes at least as much, for example enumer for a filter told the sight",
             )
+        if self.track and self.track == bound.track:
+            raise RefusedError(
+                f"{bound.name} along {bound.track} is conditional on it and bounds no error there",
+                "Compare over tracks drawn from the model (evaluate), or look at both numbers side by side",
+            )
         if self.track != bound.track:
             raise RefusedError(
                 f"{bound.name} belongs to {bound.track or 'random tracks'}, {self.name} to "

@@ -1,5 +1,7 @@
 """The separated engine: exact special cases, invariances, orders that are theorems."""
 
+import importlib
+
 import jax
 import numpy as np
 import pytest
@@ -300,3 +302,15 @@ def test_the_reported_truncation_is_no_less_than_the_error_of_the_window(stay, e
     assert cut.diagnostics["window"] < 40
     error = np.abs(np.sqrt(cut.position_mse / full.position_mse) - 1).max()
     assert 3e-3 < error < cut.diagnostics["truncation"]
+
+
+def test_large_tables_keep_fewer_groups(monkeypatch):
+    """The same draws in fewer groups: where memory is short, not another number."""
+    module = importlib.import_module("locbounds.bounds.bcrb")
+    scenario = lb.papers.fritsche2013.scenario(steps=10)
+    many = lb.bcrb(scenario, samples=2048, window=10)
+    monkeypatch.setattr(module, "TABLE_BYTES", 0.0)
+    few = lb.bcrb(scenario, samples=1024, window=10)
+    assert (len(many.replicates), len(few.replicates)) == (32, 16)
+    error = np.hypot(many.mean_position_rmse_stderr(), few.mean_position_rmse_stderr())
+    assert abs(many.mean_position_rmse() - few.mean_position_rmse()) < 4 * error

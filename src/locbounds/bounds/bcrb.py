@@ -22,7 +22,8 @@ PATHS = 64  # noise paths per group and block
 TRACKS = 16  # tracks per group and block: the geometry varies far less than the noise
 FIRST_WINDOW = 12
 GROUPS_AT_ONCE = 8
-TABLE_BYTES = 2.5e8  # the increments of one link, all groups, stay below this
+FEWEST_GROUPS = 16  # kept even for large tables: fewer say too little about a standard error
+TABLE_BYTES = 2.5e8  # above this size of one link's increments, fewer groups are kept
 
 
 def _same(a: NoiseProcess, b: NoiseProcess) -> bool:
@@ -246,7 +247,7 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
     size = min(FIRST_WINDOW if window is None else int(window), scenario.steps)
     fixed = samples is not None or differentiable
     while True:
-        groups = int(np.clip(TABLE_BYTES // (8 * scenario.steps * size**2), 8, GROUPS))
+        groups = GROUPS if 8 * GROUPS * scenario.steps * size**2 <= TABLE_BYTES else FEWEST_GROUPS
         blocks = -(-(samples or 1) // (groups * PATHS)) if fixed else None
 
         def draw(block: int, groups: int = groups, size: int = size):

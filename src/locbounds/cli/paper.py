@@ -23,15 +23,21 @@ def paper(
 ) -> None:
     """Reproduce a paper: its tables and figures, published beside computed with standard errors.
 
-    Writes table1.csv, fig1.csv and fig1.png for fritsche2013. The table on the screen compares every published entry
-    with the computed one.
+    Writes table1.csv, fig1.csv and fig1.png for fritsche2013; after Ctrl-C the finished columns of Table I. The
+    table on the screen compares every published entry with the computed one.
 
     [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
     """
     study = find_paper(name)
     with output_folder(default_out(name, out), force=force) as folder:
-        with status(f"{name}: starting") as say:
-            columns = list(study.study(samples=samples, runs=runs, seed=seed, announce=say))
+        columns = []
+        try:
+            with status(f"{name}: starting") as say:
+                columns.extend(study.study(samples=samples, runs=runs, seed=seed, announce=say))
+        except KeyboardInterrupt:
+            if columns:
+                folder.write_text("table1.csv", study.table1_csv(columns))
+            raise
         cells = study.table1(columns)
         folder.write_text("table1.csv", study.table1_csv(columns))
         folder.write_text("fig1.csv", study.fig1_csv(columns))

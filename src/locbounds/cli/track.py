@@ -186,13 +186,14 @@ def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) 
             [{"method": r.id, "kind": r.kind, "position_rmse_m": r.rmse()[0], "stderr_m": r.rmse()[1]} for r in results]
         )
         return
+    noun = "tracks" if len(log.tracks) > 1 else "track"
     rows = []
     for r in results:
         value, error = r.rmse()
         tails = f"{r.quantile(0.5):.2f} / {r.quantile(0.95):.2f}" if r.kind == "filter" else ""
         rows.append([r.id, r.kind, f"{value:.3f} m" + (f" ± {error:.3f}" if error > 0 else ""), tails])
     print_table(
-        f"Position RMSE over {len(log.tracks)} measured tracks, steps 1..K (± one standard error over tracks)",
+        f"Position RMSE over {len(log.tracks)} measured {noun}, steps 1..K (± one standard error over tracks)",
         ["method", "kind", "RMSE", "50 % / 95 % in m"],
         rows,
     )

@@ -126,8 +126,11 @@ def study(
         say(f"stay {stay}: bounds")
         return stay, [*results, *(bound(model, samples=samples, seed=seed) for bound in (bcrb, enumer))]
 
-    with ThreadPoolExecutor(COLUMNS_AT_ONCE) as pool:  # the numbers depend on the seed alone
+    pool = ThreadPoolExecutor(COLUMNS_AT_ONCE)  # the numbers depend on the seed alone
+    try:
         yield from pool.map(column, STAY)
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def table1(columns: list[tuple[float, list[Result]]]) -> list[Cell]:

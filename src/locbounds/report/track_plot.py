@@ -32,7 +32,7 @@ def along_tracks(results: Sequence[AlongTracks], *, width_s: float, title: str =
             right.axvline(value, color=f"C{k}", label=f"{label}: RMSE {value:.2f} m", **style)
     tracks = len(results[0].tracks)
     left.set(xlabel="time since the start of the track in s", ylabel="position RMSE in m", ylim=(0, None))
-    left.set_title(title or f"{tracks} measured tracks, pooled", loc="left")
+    left.set_title(title or f"{tracks} measured track{'s, pooled' if tracks > 1 else ''}", loc="left")
     right.set(xlabel="position error in m", ylabel="share of steps with a smaller error", ylim=(0, 1.01))
     right.set_xlim(0, max((r.quantile(0.99) for r in results if r.kind == "filter"), default=1.0) * 1.1)
     right.set_title("distribution", loc="left")
