@@ -113,6 +113,9 @@ def estimates(
     filter: Callable[..., Any], scenario: Scenario, z: Array, sight: Array | None, seed: int
 ) -> tuple[Float[Array, "runs times n"], Float[Array, "runs times state state"] | None]:
     """Run a filter of the library or a callable; estimates at steps 0..K and covariances where it has them."""
+    if isinstance(filter, type) or not callable(filter):
+        name = filter.__name__ if isinstance(filter, type) else repr(filter)
+        raise InputError(f"{name} is not a filter that can be called", "Give an instance, for example ImmEkf()")
     if "sight" in getattr(filter, "sees", RANGES):
         output = filter(scenario, z, seed, sight)
     else:

@@ -144,7 +144,8 @@ METHODS: dict[str, Method] = {
             RANGES,
             "locbounds.filters:ImmKf",
             (),
-            "Misses the turn of the range near an anchor; ignores the motion across links.",
+            "Misses the turn of the range near an anchor; ignores the motion across links; least squares is wild "
+            "where the geometry is poor, for example heights from anchors of one height.",
             ("liao2006", "fritsche2013"),
         ),
         Method(

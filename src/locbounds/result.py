@@ -238,6 +238,8 @@ def format_with_error(value: Any, error: float, unit: str = "m") -> str:
     >>> format_with_error(51.2345, 0.034), format_with_error(3.0, 0.0)
     ('51.234 +- 0.034 m', '3.000 m')
     """
+    if not (math.isfinite(float(value)) and math.isfinite(error)):  # a filter that diverged
+        return f"{float(value):.3g} {unit}"
     if error <= 1e-12 * abs(float(value)):  # nothing random, up to rounding
         return f"{float(value):.3f} {unit}"
     digits = max(0, 1 - int(np.floor(np.log10(error))))

@@ -154,3 +154,11 @@ def test_not_a_text_file(tmp_path):
 def test_bad_column_mapping(option):
     with pytest.raises(InputError, match="column mapping"):
         LogColumns.parse([option])
+
+
+def test_degrees_beside_metres_are_refused(read):
+    """Anchors some hundred metres apart are thousandths of a degree apart."""
+    ranges = "time_s,anchor_id,range_m\n1.0,1,60\n2.0,1,70\n2.0,2,110\n"
+    anchors = "anchor_id,x_m,y_m\n1,48.137154,11.576124\n2,48.138154,11.577124\n"
+    with pytest.raises(InputError, match="degrees"):
+        read(ranges, anchors=anchors, truth=None)

@@ -13,7 +13,11 @@ def paper(
     name: Annotated[str, typer.Argument(metavar="PAPER", help="fritsche2013", show_default=False)],
     samples: Annotated[
         int | None,
-        typer.Option("--samples", min=1, help="Draws of every bound; by default until the s.e. is below 0.1 %."),
+        typer.Option(
+            "--samples",
+            min=1,
+            help="Draws of every bound, in blocks of 2048; by default until the s.e. is below 0.1 %.",
+        ),
     ] = None,
     runs: Annotated[int, typer.Option("--runs", min=2, help="Tracks for every filter.")] = 20_000,
     seed: SeedOption = 0,

@@ -16,6 +16,7 @@ from locbounds.cli.log_options import (
 )
 from locbounds.cli.options import ForceOption, JsonOption, OutOption, ScenarioArgument, SeedOption, default_out
 from locbounds.cli.output import count_progress, output_folder, precision_progress, print_json, print_table, status
+from locbounds.errors import InputError
 
 if TYPE_CHECKING:
     from locbounds.registry import Method
@@ -63,6 +64,8 @@ def track(
     model = load(scenario)
     chosen_bounds = _bounds(model, bounds)
     chosen_filters = _filters(model, filters)
+    if not chosen_bounds and not chosen_filters:
+        raise InputError("neither a bound nor a filter was asked for", "Name at least one with --bounds or --filters")
     with output_folder(default_out(scenario, out), force=force) as folder:
         if ranges is not None or anchors is not None or truth is not None:
             log = read(ranges, anchors, truth, select, time_offset, columns, None)
@@ -193,7 +196,7 @@ def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) 
         tails = f"{r.quantile(0.5):.2f} / {r.quantile(0.95):.2f}" if r.kind == "filter" else ""
         rows.append([r.id, r.kind, f"{value:.3f} m" + (f" ± {error:.3f}" if error > 0 else ""), tails])
     print_table(
-        f"Position RMSE over {len(log.tracks)} measured {noun}, steps 1..K (± one standard error over tracks)",
+        f"Position RMSE over {len(log.tracks)} measured {noun} after the first step (± one s.e. over tracks)",
         ["method", "kind", "RMSE", "50 % / 95 % in m"],
         rows,
     )

@@ -228,7 +228,7 @@ def _noise_comments(pooled: SightNoiseFit, noise: Mapping[str, SightNoiseFit], p
         }
         if fit.outliers:
             found[f"{prefix}.outlier"] = (
-                f"{source}, {fit.outlier_share:.2%} of the ranges, {error('outlier_share')}; common to LOS and NLOS"
+                f"{source}, share {fit.outlier_share:.4f}, {error('outlier_share')}; common to LOS and NLOS"
             )
         return found
 

@@ -108,7 +108,7 @@ class CsvTable:
         nearest = f"the nearest name is {near[0]}" if near else f"it has {', '.join(self.names)}"
         raise InputError(
             f"{self.path.name} has no column {column}; {nearest}",
-            f"Rename the column or map it: --columns {self.what}.{option}={near[0] if near else 'NAME'}",
+            f"Rename the column or map it: --column {self.what}.{option}={near[0] if near else 'NAME'}",
         )
 
     def select(self, column: str, value: str) -> None:

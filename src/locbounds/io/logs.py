@@ -19,6 +19,7 @@ from locbounds.io.csv_table import CsvTable
 LABELS = {"los": 0, "nlos": 1, "": -1, "unknown": -1}
 """What a label cell may say, in upper or lower case."""
 
+OTHER_UNIT = 100.0  # ranges this many times larger than all positions' extent cannot be in the same unit
 DEGREES_SPREAD = 0.1
 """Positions that differ by less than this over a whole log look like degrees."""
 
@@ -197,7 +198,21 @@ def read_log(
         raise InputError("no range has a true position", "Compare track names, steps and times of both files")
     if labels is None:
         tracks = [replace(track, sight=None) for track in tracks]
+    _refuse_other_units(places, tracks)
     return RangeLog(tuple(names), places, tuple(tracks), tuple(notes))
+
+
+def _refuse_other_units(places: Float[ndarray, "n space"], tracks: list[Track]) -> None:
+    """Refuse positions and ranges that cannot both be metres: degrees beside metres, or millimetres beside metres."""
+    everything = np.concatenate([places, *(t.position_m for t in tracks if t.position_m is not None)])
+    extent = float(np.ptp(everything, axis=0).max())
+    typical = float(np.nanmedian(np.abs(np.concatenate([t.ranges_m.ravel() for t in tracks]))))
+    if typical > OTHER_UNIT * extent > 0:
+        raise InputError(
+            f"ranges are about {typical:.4g} m, but all positions lie within {extent:.3g} m: one of them is not in "
+            "metres (positions in degrees? ranges in millimetres?)",
+            "Convert positions to metres in a local plane and ranges to metres",
+        )
 
 
 def _select(tables: Mapping[str, CsvTable], select: str | Mapping[str, str] | None) -> bool:
