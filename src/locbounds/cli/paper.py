@@ -19,7 +19,7 @@ def paper(
             help="Draws of every bound, in blocks of 2048; by default until the s.e. is below 0.1 %.",
         ),
     ] = None,
-    runs: Annotated[int, typer.Option("--runs", min=2, help="Tracks for every filter.")] = 20_000,
+    runs: Annotated[int, typer.Option("--runs", min=2, help="Tracks for every filter (the paper: 20,000).")] = 10_000,
     seed: SeedOption = 0,
     out: OutOption = None,
     json: JsonOption = False,
