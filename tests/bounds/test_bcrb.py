@@ -304,6 +304,7 @@ def test_the_reported_truncation_is_no_less_than_the_error_of_the_window(stay, e
     assert 3e-3 < error < cut.diagnostics["truncation"]
 
 
+@pytest.mark.slow
 def test_large_tables_keep_fewer_groups(monkeypatch):
     """The same draws in fewer groups: where memory is short, not another number."""
     module = importlib.import_module("locbounds.bounds.bcrb")
