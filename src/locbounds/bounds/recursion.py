@@ -6,6 +6,8 @@ information matrix ``J_{0:k}`` at every k; with a shorter one, older information
 window.
 """
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,39 +17,60 @@ from locbounds.linalg import symmetrize
 from locbounds.scenario import Scenario
 
 
+class LinearModel(NamedTuple):
+    """Linear Gaussian motion, prior, and the state components that the increments of information are about."""
+
+    F: Float[Array, "steps state state"]
+    Q: Float[Array, "steps state state"]
+    P0: Float[Array, "state state"]
+    index: tuple[int, ...]
+
+
+def linear_model(scenario: Scenario | LinearModel) -> LinearModel:
+    """Motion and prior of a scenario, whose increments are about positions."""
+    if isinstance(scenario, LinearModel):
+        return scenario
+    return LinearModel(
+        scenario.transition,
+        scenario.process_noise,
+        jnp.asarray(scenario.prior.covariance),
+        scenario.motion.position_index,
+    )
+
+
 def covariance_recursion(
-    scenario: Scenario, increments: Float[Array, "steps window space window space"]
+    scenario: Scenario | LinearModel, increments: Float[Array, "steps window space window space"]
 ) -> Float[Array, "times state state"]:
     """Bound on the mean square error matrix at steps 0..K.
 
     Parameters
     ----------
     scenario
-        Motion and prior are taken from it.
+        Motion and prior are taken from it; or these alone.
     increments
-        Information that the measurement of step k adds about the positions at ages 0..W-1 (age 0 is step k).
+        Information that the measurement of step k adds about the positions (the components ``index`` of a
+        :class:`LinearModel`) at ages 0..W-1 (age 0 is step k).
 
     Notes
     -----
     Window covariance S of [x_k, position at age 1, ..., position at age W-1]; predict ``S <- T S T' + Q``, update
     ``S <- S - S_p (I + D S_pp)^-1 D S_p'`` with the information increment D on the positions p.
     """
-    n = scenario.motion.state_size
-    window = _Window(scenario, increments.shape[1])
+    model = linear_model(scenario)
+    n = len(model.P0)
+    window = _Window(model, increments.shape[1])
 
     def step(S, inputs):
         F, Q, D = inputs
         S = window.update(window.predict(S, F, Q), D)
         return S, S[:n, :n]
 
-    inputs = (scenario.transition, scenario.process_noise, window.flat(increments))
-    return jnp.concatenate(
-        [jnp.asarray(scenario.prior.covariance)[None], jax.lax.scan(step, window.first(), inputs)[1]]
-    )
+    inputs = (model.F, model.Q, window.flat(increments))
+    return jnp.concatenate([jnp.asarray(model.P0)[None], jax.lax.scan(step, window.first(), inputs)[1]])
 
 
 def covariance_deviations(
-    scenario: Scenario,
+    scenario: Scenario | LinearModel,
     increments: Float[Array, "steps window space window space"],
     changes: Float[Array, "groups steps window space window space"],
 ) -> Float[Array, "groups times state state"]:
@@ -56,8 +79,9 @@ def covariance_deviations(
     From ``dS <- T dS T'`` and ``d (S^-1 + D)^-1 = K dS K' - S+ dD S+`` with ``K = S+ S^-1 = I - S+ D``: all groups
     share the matrices, so that each step is four matrix products.
     """
-    n = scenario.motion.state_size
-    window = _Window(scenario, increments.shape[1])
+    model = linear_model(scenario)
+    n = len(model.P0)
+    window = _Window(model, increments.shape[1])
     groups = len(changes)
 
     def step(carry, inputs):
@@ -69,12 +93,7 @@ def covariance_deviations(
         dS = jnp.einsum("ab,gbc,dc->gad", M, dS, M) - jnp.einsum("ab,gbc,dc->gad", L, dD, L)
         return (S, dS), dS[:, :n, :n]
 
-    inputs = (
-        scenario.transition,
-        scenario.process_noise,
-        window.flat(increments),
-        jnp.moveaxis(window.flat(changes), 0, 1),
-    )
+    inputs = (model.F, model.Q, window.flat(increments), jnp.moveaxis(window.flat(changes), 0, 1))
     first = (window.first(), jnp.zeros((groups, window.size, window.size)))
     _, later = jax.lax.scan(step, first, inputs)
     return jnp.concatenate([jnp.zeros((groups, 1, n, n)), jnp.moveaxis(later, 0, 1)], axis=1)
@@ -83,11 +102,11 @@ def covariance_deviations(
 class _Window:
     """The last states as one vector [x_k, position at age 1, ..., position at age W-1] and its covariance."""
 
-    def __init__(self, scenario: Scenario, ages: int):
-        n, d = scenario.motion.state_size, scenario.dim
-        position = np.array(scenario.motion.position_index)
+    def __init__(self, model: LinearModel, ages: int):
+        n, d = len(model.P0), len(model.index)
+        position = np.array(model.index)
         self.n, self.size = n, n + d * (ages - 1)
-        self.prior = scenario.prior.covariance
+        self.prior = model.P0
         self.observed = np.concatenate([position, np.arange(n, self.size)])
         self.age = np.zeros((self.size, self.size))  # ages move on by one; age 1 is taken from the state
         if ages > 1:
