@@ -8,7 +8,7 @@ from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
 from .measurement import Range
-from .motion import ConstantVelocity
+from .motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
 from .noise import Gaussian, GaussianMixture
 from .priors import GaussianPrior
 from .registry import explain
@@ -22,7 +22,9 @@ from .times import Times
 __version__: str
 __all__ = [
     "AlongTrack",
+    "ConstantAcceleration",
     "ConstantVelocity",
+    "CoordinatedTurn",
     "Draws",
     "DwellSight",
     "Estimates",
@@ -34,16 +36,19 @@ __all__ = [
     "ImmKf",
     "InputError",
     "KnownSight",
+    "LinearMotion",
     "Link",
     "LocboundsError",
     "MarkovSight",
     "OracleEkf",
     "PrecisionError",
     "Prior",
+    "RandomWalk",
     "Range",
     "RefusedError",
     "Result",
     "Scenario",
+    "SwitchingMotion",
     "Times",
     "bcrb",
     "bcrb_algorithm1",

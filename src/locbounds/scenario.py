@@ -137,12 +137,12 @@ class Scenario(eqx.Module):
     @property
     def transition(self) -> Float[Array, "steps state state"]:
         """F of every step."""
-        return jax.vmap(self.motion.transition)(jnp.asarray(self.times.intervals))
+        return self.motion.transitions(self.times.intervals)
 
     @property
     def process_noise(self) -> Float[Array, "steps state state"]:
         """Q of every step."""
-        return jax.vmap(self.motion.covariance)(jnp.asarray(self.times.intervals))
+        return self.motion.covariances(self.times.intervals)
 
     def replace(self, **changes) -> "Scenario":
         """A copy with some fields changed; all checks run again."""
