@@ -7,10 +7,11 @@ from .filters import Estimates, FactorisedImmEkf, ImmEkf, ImmKf, OracleEkf
 from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
-from .measurement import Range
+from .measurement import BySight, Range
+from .model import AdditiveChannel, DensityChannel, DensityMotion, JumpMarkov, jump_markov
 from .motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
 from .noise import Gaussian, GaussianMixture
-from .priors import GaussianPrior
+from .priors import DensityPrior, GaussianPrior
 from .registry import explain
 from .report import plot
 from .result import Result, tightest
@@ -21,10 +22,15 @@ from .times import Times
 
 __version__: str
 __all__ = [
+    "AdditiveChannel",
     "AlongTrack",
+    "BySight",
     "ConstantAcceleration",
     "ConstantVelocity",
     "CoordinatedTurn",
+    "DensityChannel",
+    "DensityMotion",
+    "DensityPrior",
     "Draws",
     "DwellSight",
     "Estimates",
@@ -35,6 +41,7 @@ __all__ = [
     "ImmEkf",
     "ImmKf",
     "InputError",
+    "JumpMarkov",
     "KnownSight",
     "LinearMotion",
     "Link",
@@ -56,6 +63,7 @@ __all__ = [
     "evaluate",
     "explain",
     "fit_scenario",
+    "jump_markov",
     "known_sight",
     "load",
     "los_only",

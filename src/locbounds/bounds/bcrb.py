@@ -10,13 +10,16 @@ from locbounds.axes import Array, Float
 from locbounds.blocks import GROUPS, Stream, block_key, check_seed
 from locbounds.bounds.common import bound_result, prepare
 from locbounds.bounds.expectation import Expectation, directions, windows
+from locbounds.bounds.general import general, model_verdict
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
 from locbounds.bounds.recursion import covariance_deviations, covariance_recursion
 from locbounds.bounds.score_covariance import NoiseProcess, noise_process, score_covariance_increments
-from locbounds.errors import InputError
+from locbounds.errors import InputError, RefusedError
+from locbounds.model import JumpMarkov, jump_markov
 from locbounds.precision import double_precision, traced
 from locbounds.result import Result
-from locbounds.scenario import Scenario
+from locbounds.scenario import Scenario, beyond_separation
+from locbounds.verdict import Status
 
 PATHS = 64  # noise paths per group and block
 TRACKS = 16  # tracks per group and block: the geometry varies far less than the noise
@@ -118,7 +121,7 @@ def _truncation(scenario, C, G) -> float:
 
 @double_precision
 def bcrb(
-    scenario: Scenario,
+    scenario: Scenario | JumpMarkov,
     *,
     rtol: float | None = None,
     samples: int | None = None,
@@ -127,16 +130,19 @@ def bcrb(
     window: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    r"""Bayesian Cramér-Rao bound of a jump-Markov measurement model, at every step.
+    r"""Bayesian Cramér-Rao bound of a jump-Markov model, at every step.
 
-    The information of the ranges is separated into the covariance of the noise score, a property of each link's noise
+    The engine is chosen by what the model needs; ``provenance.how`` names it and the reason. The general engine
+    (:mod:`locbounds.bounds.general`) takes every :class:`~locbounds.JumpMarkov` and every scenario whose motion
+    switches, whose measurements depend on the sight or whose links share a chain. All others separate: the information
+    of the ranges is separated into the covariance of the noise score, a property of each link's noise
     process (see :mod:`locbounds.bounds.score_covariance`), and the expected products of range gradients. Modes are
     never enumerated; links with equal noise processes share their noise draws.
 
     Parameters
     ----------
     scenario
-        The model. Chains and noises of different links are independent.
+        The model. Noises of different links are independent, and so are chains that are not named as one.
     rtol
         Largest relative standard error of the position RMSE over the steps; draws are added until it is reached.
         Default 1e-3.
@@ -183,7 +189,25 @@ def bcrb(
     >>> bool(abs(bound.mean_position_rmse() - 51.2) < 0.2)
     True
     """
+    if isinstance(scenario, JumpMarkov) or beyond_separation(scenario):
+        return _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress)
     return separated("bcrb", scenario, rtol, samples, seed, expectation, window, progress)
+
+
+def _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress) -> Result:
+    if traced(scenario, expectation):
+        raise InputError(
+            "the general engine cannot be transformed by JAX",
+            "Transform a scenario with links of their own chains and a motion without modes",
+        )
+    if isinstance(scenario, JumpMarkov):
+        verdict, model, why = model_verdict(scenario), scenario, "the model is a JumpMarkov"
+        if verdict.status is Status.REFUSED:
+            raise RefusedError(f"bcrb does not apply: {'; '.join(verdict.reasons)}", "See: locbounds explain bcrb")
+    else:
+        _, verdict = prepare("bcrb", scenario, None)
+        model, why = jump_markov(scenario.anonymous()), str(beyond_separation(scenario))
+    return general("bcrb", model, why, rtol, samples, seed, expectation, window, progress, verdict)
 
 
 @double_precision

@@ -72,6 +72,21 @@ class MarkovSight(Sight):
         los, nlos = np.broadcast_to(float64(stay), (2,))
         return cls(start, [[los, 1 - los], [1 - nlos, nlos]])
 
+    @classmethod
+    def independent(cls, law) -> "MarkovSight":
+        """Modes drawn afresh at every step.
+
+        Parameters
+        ----------
+        law
+            Probability of every mode, [modes].
+
+        >>> MarkovSight.independent([0.8, 0.2]).transition.tolist()
+        [[0.8, 0.2], [0.8, 0.2]]
+        """
+        law = float64(law)
+        return cls(law, (jnp if traced(law) else np).broadcast_to(law, (len(law), len(law))))
+
     def transitions(self, intervals: Float[Array, " steps"]) -> Float[Array, "steps modes modes"]:
         if not traced(intervals) and np.ptp(intervals) > EQUAL_STEPS * np.max(intervals):
             raise InputError(
