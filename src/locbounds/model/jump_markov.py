@@ -127,7 +127,7 @@ class JumpMarkov(eqx.Module):
 
     def _check_shapes(self) -> None:
         """Call every function once, without computing: wrong shapes are found here and not inside the engine."""
-        key, k = jax.random.key(0), np.int64(1)
+        key, k = jax.random.key(0), jax.ShapeDtypeStruct((), jnp.result_type(int))
         x = jax.ShapeDtypeStruct((self.state_size,), jnp.result_type(float))
 
         def shape(what: str, function, *arguments):
@@ -146,17 +146,23 @@ class JumpMarkov(eqx.Module):
         if isinstance(self.motion, DensityMotion):
             motion = self.motion
             for r in range(self.modes(self.motion_chain) if motion.switching else 1):
-                draw = shape("sample of the motion", lambda x, r=r: motion.sample(key, x, r, k), x)
+                draw = shape("sample of the motion", lambda x, k, r=r: motion.sample(key, x, r, k), x, k)
                 same("sample of the motion", draw, x.shape)
-                value = shape("log_density of the motion", lambda x, r=r: motion.log_density(x, x, r, k), x)
+                value = shape("log_density of the motion", lambda x, k, r=r: motion.log_density(x, x, r, k), x, k)
                 same("log_density of the motion", value, ())
         for c, channel in enumerate(self.channels):
             for r in range(self.modes(channel.chain)):
-                z = shape(f"channel {c}", lambda x, r=r: channel.draw(key, channel.seen(x), r, k), x)  # noqa: B023
+
+                def draw(x, k, channel=channel, r=r):
+                    return channel.draw(key, channel.seen(x), r, k)
+
+                def log_density(z, x, k, channel=channel, r=r):
+                    return channel.evaluate(z, channel.seen(x), r, k).log_density
+
+                z = shape(f"channel {c}", draw, x, k)
                 if isinstance(channel, AdditiveChannel):
                     same(f"h of channel {c}", z, ())
-                z = jax.ShapeDtypeStruct(z, x.dtype)
-                shape(f"channel {c}", lambda x, z, r=r: channel.evaluate(z, channel.seen(x), r, k).log_density, x, z)  # noqa: B023
+                shape(f"channel {c}", log_density, jax.ShapeDtypeStruct(z, x.dtype), x, k)
 
     @property
     def steps(self) -> int:

@@ -1,9 +1,9 @@
 r"""Increments of the information from one part of a model, step by step.
 
 Let ``g_n(r)`` be the score of step n in mode r, the gradient of ``log p(z_n | x_n, r)``, plus
-``log p(x_n | x_{n-1}, r)`` where the motion belongs to the part. ``a_n(k) = E[g_n(r_n) | x, z_{1:k}]`` is a martingale in
-k, its mean over draws given the past is zero at k = n, and the score of horizon k is ``sum_n a_n(k)``. Hence the
-information grows by ``E[D_k D_k^T]`` with ``D_k = a_k(k) + sum_{n<k} (a_n(k) - a_n(k-1))``. See the theory page.
+``log p(x_n | x_{n-1}, r)`` where the motion belongs to the part. The mean ``a_n(k) = E[g_n(r_n) | x, z_{1:k}]`` is a
+martingale in k, its expectation given the past is zero at k = n, and the score of horizon k is ``sum_n a_n(k)``. Hence
+the information grows by ``E[D_k D_k^T]`` with ``D_k = a_k(k) + sum_{n<k} (a_n(k) - a_n(k-1))``. See the theory page.
 
 With the filtered law ``p_k(r)``, ``q(r) = Pr(r_{k-1} = r | x, z_{1:k})`` and the differences between modes
 ``d_n(r) = E[g_n | past, r_{k-1} = r] - E[g_n | past, r_{k-1} = 0]`` one step adds
