@@ -3,6 +3,7 @@
 from functools import partial
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -128,6 +129,7 @@ def _draw_block(scenario: Scenario, seed: Array, block: Array, runs: int) -> Dra
     return Draws(states, jnp.stack(sights, -1), jnp.stack(measurements, -1))
 
 
+@eqx.filter_jit
 def _draw_general_block(model: JumpMarkov, seed: Array, block: Array, runs: int) -> Draws:
     paths = draw_paths(model, seed, block, runs)
     z = [

@@ -79,7 +79,7 @@ def information_increments(
         return u.reshape(groups, -1, *u.shape[1:]).mean(1)
 
     def products(a: Array, b: Array) -> Array:  # group means of sums of outer products: [n, i, a], [n, i, b]
-        a, b = (u.reshape(groups, -1, u.shape[-1]) for u in (a, b))
+        a, b = (u.reshape(groups, n // groups * u.shape[1], u.shape[2]) for u in (a, b))
         return jnp.einsum("gia,gib->gab", a, b) * (groups / n)
 
     def step(carry, inputs):
@@ -96,13 +96,17 @@ def information_increments(
         older = d[:, :, : window - 1]
         weight = jnp.where(own, law[:, None], p_new[:, :, None])
         root = roots * jnp.sqrt(weight)[..., None]
-        known = products(root.reshape(n, -1, m), root.reshape(n, -1, m)) + exact
+        known = products(root.reshape(n, modes * len(own), m), root.reshape(n, modes * len(own), m)) + exact
         weighted = jnp.sqrt(p_new)[..., None] * g
         newest = known - products(weighted, weighted) + products(a[:, None], a[:, None])
         c = g_with - a[:, None] * q[..., None]
-        cross = -products(c[:, 1:], older.reshape(n, modes - 1, -1)) if modes > 1 else jnp.zeros((groups, m, 0))
+        cross = (
+            -products(c[:, 1:], older.reshape(n, modes - 1, (window - 1) * m))
+            if modes > 1
+            else jnp.zeros((groups, m, 0))
+        )
         xi = jnp.einsum("nr,nrwm->nwm", (q - p)[:, 1:], older)
-        xi = _spread(xi, v, lag).reshape(n, 1, -1)
+        xi = _spread(xi, v, lag).reshape(n, 1, (window - 1 + lag) * v)
         table = _table(newest, cross.reshape(groups, m, window - 1, m), products(xi, xi), window, v, lag)
 
         backward = joint / jnp.where(p_new > 0, p_new, 1.0)[:, None, :]  # Pr(r_{k-1} | r_k, past and present)
@@ -136,7 +140,7 @@ def _table(newest: Array, cross: Array, old: Array, window: int, v: int, lag: in
     """One step's increments by age; the newest score is about ages 0..lag, older ones about ages 1 and more."""
     groups, ages = len(newest), window + lag
     near, far = np.arange(v * (1 + lag)), np.arange(v, v * ages)
-    cross = _spread(cross, v, lag).reshape(groups, len(near), -1)[..., : len(far)]
+    cross = _spread(cross, v, lag).reshape(groups, len(near), (window - 1 + lag) * v)
     table = jnp.zeros((groups, v * ages, v * ages))
     table = table.at[:, near[:, None], near].add(newest)
     if window > 1:
