@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from locbounds.errors import InputError
 from locbounds.scenario import Scenario
-from locbounds.verdict import KNOWN_SIGHT, LOS_AND_NLOS, SMOOTH_NOISE, Assumption, Verdict, judge
+from locbounds.verdict import KNOWN_SIGHT, LOS_AND_NLOS, SEPARABLE, SMOOTH_NOISE, Assumption, Verdict, judge
 
 RANGES = frozenset({"ranges"})
 RANGES_AND_SIGHT = frozenset({"ranges", "sight"})
@@ -86,7 +86,7 @@ METHODS: dict[str, Method] = {
             "Ignores that the sight has to be inferred, hence often loose; neither always above nor always below the "
             "BCRB.",
             ("hernandez2005", "fritsche2013"),
-            (SMOOTH_NOISE,),
+            (SMOOTH_NOISE, SEPARABLE),
         ),
         Method(
             "known-sight",
@@ -99,7 +99,7 @@ METHODS: dict[str, Method] = {
             "Needs the schedule; along one given track it is a conditional number that bounds no error over random "
             "tracks.",
             ("chen2010", "tichavsky1998"),
-            (SMOOTH_NOISE, KNOWN_SIGHT),
+            (SMOOTH_NOISE, KNOWN_SIGHT, SEPARABLE),
         ),
         Method(
             "los-only",
@@ -111,7 +111,7 @@ METHODS: dict[str, Method] = {
             (),
             "Not a bound for filters that use NLOS ranges; right where the NLOS excess is unknown and arbitrary.",
             ("qi2006",),
-            (SMOOTH_NOISE, LOS_AND_NLOS),
+            (SMOOTH_NOISE, LOS_AND_NLOS, SEPARABLE),
             ("estimators that discard NLOS ranges, or an NLOS excess about which nothing is known",),
         ),
         Method(

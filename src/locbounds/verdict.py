@@ -8,7 +8,7 @@ import numpy as np
 
 from locbounds.axes import LOS, NLOS
 from locbounds.precision import double_precision, traced
-from locbounds.scenario import Scenario
+from locbounds.scenario import Scenario, beyond_separation
 from locbounds.sight import DwellSight, KnownSight, MarkovSight
 
 NEARLY_CERTAIN = 1e-3  # a chain that changes (or keeps) its mode less often than this per step is called deterministic
@@ -108,6 +108,13 @@ def two_modes(scenario: Scenario) -> str | None:
     return f"anchors {', '.join(other)} do not have exactly the modes LOS and NLOS" if other else None
 
 
+def not_separable(scenario: Scenario) -> str | None:
+    """Why links do not have chains and measurements of their own, or None."""
+    why = beyond_separation(scenario)
+    return None if why is None else f"{why}: bcrb takes that, this does not"
+
+
+SEPARABLE = Assumption("motion without modes, one chain per link, measurements that do not depend on it", not_separable)
 SMOOTH_NOISE = Assumption("every noise has a finite Fisher information about a shift", regular_noise)
 KNOWN_SIGHT = Assumption("the sight of every link is known at every step", all_sights_known)
 LOS_AND_NLOS = Assumption("every link is either LOS or NLOS", two_modes)

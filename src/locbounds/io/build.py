@@ -11,6 +11,8 @@ from locbounds.errors import InputError
 from locbounds.io.anchors_csv import read_anchors
 from locbounds.io.complain import quoted, unknown_key_remedy
 from locbounds.io.schema import (
+    MOTION_KEYS,
+    SPREADS,
     AnchorTable,
     LinksSection,
     MotionSection,
@@ -23,7 +25,7 @@ from locbounds.io.schema import (
     TimeSection,
 )
 from locbounds.measurement import Range
-from locbounds.motion import ConstantVelocity
+from locbounds.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, Motion, RandomWalk
 from locbounds.noise import Gaussian, GaussianMixture, Noise
 from locbounds.priors import GaussianPrior
 from locbounds.scenario import Link, Scenario
@@ -54,18 +56,24 @@ def build_times(time: TimeSection) -> Times:
         return Times.uniform(step_s=time.step_s, steps=time.steps)
 
 
-def build_motion(motion: MotionSection, dim: int) -> ConstantVelocity:
+def build_motion(motion: MotionSection, dim: int) -> Motion:
     """Motion model in as many dimensions as the prior."""
-    discrete = motion.model == "constant-velocity-discrete"
-    name = "acceleration_var_m2_s4" if discrete else "psd_m2_s3"
+    name = MOTION_KEYS[motion.model][0]
     intensity = getattr(motion, name)
-    if isinstance(intensity, tuple) and len(intensity) != dim:
+    turns = motion.model == "coordinated-turn"
+    if isinstance(intensity, tuple) and (turns or len(intensity) != dim):
         raise InputError(
             f"motion.{name} has {len(intensity)} numbers, prior.position_m {dim} coordinates",
-            "Give one number, or one per coordinate",
+            "Give one number" if turns else "Give one number, or one per coordinate",
         )
     with at("motion"):
-        return ConstantVelocity(intensity, dim, discrete=discrete)
+        if motion.model == "random-walk":
+            return RandomWalk(intensity, dim)
+        if motion.model == "constant-acceleration":
+            return ConstantAcceleration(intensity, dim)
+        if turns:
+            return CoordinatedTurn(motion.turn_rate_rad_s, intensity, dim)
+        return ConstantVelocity(intensity, dim, discrete=motion.model == "constant-velocity-discrete")
 
 
 def _covariance(spread, dim: int) -> ndarray:
@@ -75,18 +83,19 @@ def _covariance(spread, dim: int) -> ndarray:
 
 
 def build_prior(prior: PriorSection) -> GaussianPrior:
-    """Prior of position and velocity."""
-    n = len(prior.position_m)
-    covariance = np.zeros((2 * n, 2 * n))
+    """Prior of position, velocity and acceleration, as many as there are."""
+    n, means = len(prior.position_m), prior.means
+    covariance = np.zeros((len(means) * n, len(means) * n))
     if prior.covariance is not None:
         covariance[:] = prior.covariance
     else:
-        for name, block in (("position_std_m", slice(0, n)), ("velocity_std_m_s", slice(n, None))):
+        for i, name in enumerate(SPREADS[: len(means)]):
+            block = slice(i * n, (i + 1) * n)
             covariance[block, block] = _covariance(getattr(prior, name), n)
             with at(f"prior.{name}"):
                 GaussianPrior(np.zeros(n), covariance[block, block])
     with at("prior"):
-        return GaussianPrior([*prior.position_m, *prior.velocity_m_s], covariance)
+        return GaussianPrior([x for name in means for x in getattr(prior, name)], covariance)
 
 
 def build_schedule(known, times: Times) -> list[int]:

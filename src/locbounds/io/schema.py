@@ -68,21 +68,46 @@ class TimeSection(Section):
         return self
 
 
+MOTION_KEYS = {
+    "constant-velocity": ("psd_m2_s3",),
+    "constant-velocity-discrete": ("acceleration_var_m2_s4",),
+    "random-walk": ("diffusion_m2_s",),
+    "constant-acceleration": ("jerk_psd_m2_s5",),
+    "coordinated-turn": ("psd_m2_s3", "turn_rate_rad_s"),
+}
+DERIVATIVES = ("position_m", "velocity_m_s", "acceleration_m_s2")  # of the prior, as many as the motion's state has
+SPREADS = ("position_std_m", "velocity_std_m_s", "acceleration_std_m_s2")
+ORDER = {"random-walk": 1, "constant-acceleration": 3}  # how many of them; 2 for all others
+
+
 class MotionSection(Section):
     """How the mobile moves."""
 
-    model: Literal["constant-velocity", "constant-velocity-discrete"] = needed(
-        '"constant-velocity" (continuous white acceleration) or "constant-velocity-discrete" (constant during a step)'
+    model: Literal[
+        "constant-velocity",
+        "constant-velocity-discrete",
+        "random-walk",
+        "constant-acceleration",
+        "coordinated-turn",
+    ] = needed(
+        '"constant-velocity" (white acceleration), "constant-velocity-discrete" (constant during a step), '
+        '"random-walk", "constant-acceleration" (white jerk) or "coordinated-turn" (known turn rate)'
     )
     psd_m2_s3: PerAxis | None = key("power spectral density of the acceleration, a number or one per axis")
     acceleration_var_m2_s4: PerAxis | None = key("variance of the acceleration of each step, a number or one per axis")
+    diffusion_m2_s: PerAxis | None = key("variance of the displacement per second, a number or one per axis")
+    jerk_psd_m2_s5: PerAxis | None = key("power spectral density of the jerk, a number or one per axis")
+    turn_rate_rad_s: Number | None = key("turn rate, positive to the left")
 
     @model_validator(mode="after")
     def _matching_intensity(self):
-        wanted = "psd_m2_s3" if self.model == "constant-velocity" else "acceleration_var_m2_s4"
-        if self.given("psd_m2_s3", "acceleration_var_m2_s4") != [wanted]:
-            given = ", ".join(self.given("psd_m2_s3", "acceleration_var_m2_s4")) or "no intensity"
-            raise fail(f'has model = "{self.model}" with {given}', f"This model takes {wanted} and nothing else")
+        wanted = list(MOTION_KEYS[self.model])
+        given = self.given(*dict.fromkeys(name for names in MOTION_KEYS.values() for name in names))
+        if given != wanted:
+            raise fail(
+                f'has model = "{self.model}" with {", ".join(given) or "no intensity"}',
+                f"This model takes {' and '.join(wanted)} and nothing else",
+            )
         return self
 
 
@@ -91,26 +116,45 @@ class PriorSection(Section):
 
     position_m: Point = needed("mean position at step 0, for example position_m = [500, 500]; three numbers for 3-D")
     position_std_m: Spread | None = key("a number, one per axis, or a covariance matrix in m^2")
-    velocity_m_s: Point = needed("mean velocity at step 0, for example velocity_m_s = [5, 5]")
+    velocity_m_s: Point | None = key("mean velocity at step 0, for example velocity_m_s = [5, 5]")
     velocity_std_m_s: Spread | None = key("a number, one per axis, or a covariance matrix in (m/s)^2")
-    covariance: Matrix | None = key("instead of both deviations: covariance of position and velocity, in m and m/s")
+    acceleration_m_s2: Point | None = key("mean acceleration at step 0, for model = constant-acceleration")
+    acceleration_std_m_s2: Spread | None = key("a number, one per axis, or a covariance matrix in (m/s^2)^2")
+    covariance: Matrix | None = key("instead of the deviations: covariance of position and velocity, in m and m/s")
+
+    @property
+    def means(self) -> list[str]:
+        """Which of position, velocity and acceleration the file has."""
+        return self.given(*DERIVATIVES)
 
     @model_validator(mode="after")
     def _fits(self):
-        n = len(self.position_m)
-        if len(self.velocity_m_s) != n:
-            raise fail(f"has {n} position and {len(self.velocity_m_s)} velocity coordinates", "Give as many of each")
+        n, means = len(self.position_m), self.means
+        if means != list(DERIVATIVES[: len(means)]):
+            raise fail("has acceleration_m_s2 without velocity_m_s", "Give position, velocity and acceleration")
+        for name in means:
+            if len(getattr(self, name)) != n:
+                word = name.split("_")[0]
+                raise fail(
+                    f"has {n} position and {len(getattr(self, name))} {word} coordinates", "Give as many of each"
+                )
+        spreads = SPREADS[: len(means)]
+        for name in self.given(*SPREADS[len(means) :]):
+            raise fail(f"has {name} without {DERIVATIVES[SPREADS.index(name)]}", "Give both or neither")
         if self.covariance is None:
-            for name in ("position_std_m", "velocity_std_m_s"):
+            for name in spreads:
                 value = getattr(self, name)
                 if value is None:
                     raise fail(f"has no {name}", f"Add {name}: {type(self).model_fields[name].description}")
                 if isinstance(value, tuple) and len(value) != n:
                     raise fail(f"has {n} coordinates, but {name} has {len(value)}", "Give one per coordinate")
-        elif self.given("position_std_m", "velocity_std_m_s"):
+        elif self.given(*spreads):
             raise fail("has both a covariance and deviations", "Keep one of them")
-        elif len(self.covariance) != 2 * n:
-            raise fail(f"has a covariance of {len(self.covariance)} rows", f"Give {2 * n}: positions, then velocities")
+        elif len(self.covariance) != len(means) * n:
+            raise fail(
+                f"has a covariance of {len(self.covariance)} rows",
+                f"Give {len(means) * n}: {', then '.join(name.split('_')[0] for name in means)}",
+            )
         return self
 
 
@@ -211,3 +255,20 @@ class ScenarioFile(Section):
     anchors: dict[str, AnchorTable] = Field(
         {}, description="a section [anchors], a line NAME = { position_m = [..] } each"
     )
+
+    @model_validator(mode="after")
+    def _prior_of_the_motion(self):
+        wanted = DERIVATIVES[: ORDER.get(self.motion.model, 2)]
+        missing, extra = set(wanted) - set(self.prior.means), set(self.prior.means) - set(wanted)
+        for name in (d for d in DERIVATIVES if d in missing):
+            raise fail(
+                f'prior has no {name}, which motion.model = "{self.motion.model}" needs',
+                f"Add {name}: {PriorSection.model_fields[name].description}",
+            )
+        if extra:
+            raise fail(
+                f"prior has {', '.join(d for d in DERIVATIVES if d in extra)}, which "
+                f'motion.model = "{self.motion.model}" does not know',
+                "Remove it and its deviation, or choose another model",
+            )
+        return self

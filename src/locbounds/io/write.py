@@ -1,5 +1,6 @@
 """From a scenario to the keys of a scenario file: the plainest keys that read back to exactly the same numbers."""
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -10,7 +11,10 @@ import numpy as np
 from locbounds.errors import InputError
 from locbounds.io import build
 from locbounds.io.schema import (
+    DERIVATIVES,
     FORMAT,
+    MOTION_KEYS,
+    SPREADS,
     NlosTable,
     NoiseTable,
     OutlierTable,
@@ -18,7 +22,8 @@ from locbounds.io.schema import (
     SightTable,
     TimeSection,
 )
-from locbounds.motion import ConstantVelocity
+from locbounds.measurement import BySight
+from locbounds.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, RandomWalk
 from locbounds.noise import Gaussian, GaussianMixture, Noise
 from locbounds.priors import GaussianPrior
 from locbounds.scenario import Link, Scenario
@@ -79,13 +84,20 @@ def time_keys(times: Times) -> dict:
 
 def motion_keys(motion: Any) -> dict:
     """Name and intensity of the motion model."""
-    if type(motion) is not ConstantVelocity:
+    names = {
+        ConstantVelocity: "constant-velocity",
+        RandomWalk: "random-walk",
+        ConstantAcceleration: "constant-acceleration",
+        CoordinatedTurn: "coordinated-turn",
+    }
+    if type(motion) not in names:
         raise _cannot(f"the motion model {type(motion).__name__}")
-    q = motion.intensity
-    intensity = plain(q[0] if np.all(q == q[0]) else q)
-    if motion.discrete:
-        return {"model": "constant-velocity-discrete", "acceleration_var_m2_s4": intensity}
-    return {"model": "constant-velocity", "psd_m2_s3": intensity}
+    name = names[type(motion)]
+    if isinstance(motion, ConstantVelocity) and motion.discrete:
+        name = "constant-velocity-discrete"
+    q = np.atleast_1d(motion.intensity)
+    keys = {"model": name, MOTION_KEYS[name][0]: plain(q[0] if np.all(q == q[0]) else q)}
+    return keys | ({"turn_rate_rad_s": plain(motion.rate_rad_s)} if isinstance(motion, CoordinatedTurn) else {})
 
 
 def _spreads(covariance: Any) -> list:
@@ -94,21 +106,15 @@ def _spreads(covariance: Any) -> list:
     return [plain(deviations[0]), plain(deviations), plain(covariance)]
 
 
-def prior_keys(prior: GaussianPrior) -> dict:
+def prior_keys(prior: GaussianPrior, dim: int) -> dict:
     """Means and deviations, or the whole covariance."""
-    n = len(prior.mean) // 2
-    means = {"position_m": plain(prior.mean[:n]), "velocity_m_s": plain(prior.mean[n:])}
-    blocks = (_spreads(prior.covariance[:n, :n]), _spreads(prior.covariance[n:, n:]))
-    candidates = [
-        {
-            "position_m": means["position_m"],
-            "position_std_m": p,
-            "velocity_m_s": means["velocity_m_s"],
-            "velocity_std_m_s": v,
-        }
-        for p in blocks[0]
-        for v in blocks[1]
-    ]
+    order = len(prior.mean) // dim
+    blocks = [slice(i * dim, (i + 1) * dim) for i in range(order)]
+    means = {name: plain(prior.mean[block]) for name, block in zip(DERIVATIVES, blocks, strict=False)}
+    candidates = []
+    for choice in itertools.product(*[_spreads(prior.covariance[block, block]) for block in blocks]):
+        pairs = zip(means.items(), zip(SPREADS, choice, strict=False), strict=True)
+        candidates.append(dict(item for pair in pairs for item in pair))
     candidates.append(means | {"covariance": plain(prior.covariance)})
     found = _first(candidates, lambda keys: build.build_prior(PriorSection.model_validate(keys)), prior)
     assert found is not None
@@ -191,6 +197,10 @@ def link_keys(link: Link, times: Times) -> dict:
     """All keys of one link except its position."""
     if len(link.noises) != 2:
         raise _cannot(f"anchor {link.name} with {len(link.noises)} sight conditions")
+    if isinstance(link.measurement, BySight):
+        raise _cannot(f"the measurement of anchor {link.name}, which depends on the sight,")
+    if link.chain is not None:
+        raise _cannot(f"the chain {link.chain} that anchor {link.name} shares")
     keys = {"measure": "range", "sight": sight_keys(link.sight, times), **noise_keys(*link.noises)}
     if link.reports is not None:
         keys["missing_steps"] = (np.flatnonzero(~np.asarray(link.reports, dtype=bool)) + 1).tolist()
@@ -228,7 +238,7 @@ def file_keys(scenario: Scenario) -> dict[str, Any]:
         "title": scenario.title,
         "time": time_keys(scenario.times),
         "motion": motion_keys(scenario.motion),
-        "prior": prior_keys(scenario.prior),
+        "prior": prior_keys(scenario.prior, scenario.dim),
         "links": shared,
         "anchors": anchors,
     }

@@ -96,15 +96,12 @@ def information_increments(
         older = d[:, :, : window - 1]
         weight = jnp.where(own, law[:, None], p_new[:, :, None])
         root = roots * jnp.sqrt(weight)[..., None]
-        known = products(root.reshape(n, modes * len(own), m), root.reshape(n, modes * len(own), m)) + exact
+        root = root.reshape(n, modes * len(own), m)
+        known = products(root, root) + exact
         weighted = jnp.sqrt(p_new)[..., None] * g
         newest = known - products(weighted, weighted) + products(a[:, None], a[:, None])
         c = g_with - a[:, None] * q[..., None]
-        cross = (
-            -products(c[:, 1:], older.reshape(n, modes - 1, (window - 1) * m))
-            if modes > 1
-            else jnp.zeros((groups, m, 0))
-        )
+        cross = -products(c[:, 1:], older.reshape(n, modes - 1, (window - 1) * m))
         xi = jnp.einsum("nr,nrwm->nwm", (q - p)[:, 1:], older)
         xi = _spread(xi, v, lag).reshape(n, 1, (window - 1 + lag) * v)
         table = _table(newest, cross.reshape(groups, m, window - 1, m), products(xi, xi), window, v, lag)
