@@ -90,7 +90,9 @@ def _filters(model: "Scenario", ids: str | None) -> list[Any]:
     from locbounds import registry
 
     if ids is None:
-        ids = f"{'imm-ekf' if len(model.links) <= JOINT_ANCHORS else 'imm-ekf-factorised'},imm-kf"
+        ids = "imm-ekf" if len(model.links) <= JOINT_ANCHORS else "imm-ekf-factorised"
+        if model.motion.state_size == 2 * model.dim:  # imm-kf smooths ranges and range rates
+            ids += ",imm-kf"
     return [] if ids == "none" else [registry.load(registry.method(id.strip(), "filter"))() for id in ids.split(",")]
 
 
