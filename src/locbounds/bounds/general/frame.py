@@ -32,7 +32,7 @@ class Tables(NamedTuple):
 
     increments: Float[Array, "groups steps ages components ages components"]
     prior: Float[Array, "groups state state"]
-    scores: tuple[Float[Array, "groups m"], ...]
+    scores: tuple[Array, ...]
 
 
 class Frame(NamedTuple):

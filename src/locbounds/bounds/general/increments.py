@@ -36,11 +36,12 @@ class Increments(NamedTuple):
     information
         By age relative to the horizon of step k: age 0 is x_k.
     score
-        Of the newest score: zero in expectation, which checks densities against samplers.
+        Of the newest score, then of each density's own that the user wrote: zero in expectation, which checks
+        densities against samplers.
     """
 
     information: Float[Array, "groups steps ages components ages components"]
-    score: Float[Array, "groups steps m"]
+    score: Float[Array, "groups steps scores"]
 
 
 @eqx.filter_jit
@@ -69,7 +70,8 @@ def information_increments(
         Scores kept: ages 0..window-1; they are about ages 0..window-1 of the state, one more with lag 1.
     """
     n, modes, lag, v = x.shape[1], part.modes, part.lag, len(part.components)
-    own = part.exact_roots()
+    exact_root = part.exact_roots()
+    density = part.densities()
     m = v * (1 + lag)
 
     def evaluate(x, before, z, motion, k, reported):
@@ -94,9 +96,9 @@ def information_increments(
         a = g_with.sum(1)
 
         older = d[:, :, : window - 1]
-        weight = jnp.where(own, law[:, None], p_new[:, :, None])
+        weight = jnp.where(exact_root, law[:, None], p_new[:, :, None])
         root = roots * jnp.sqrt(weight)[..., None]
-        root = root.reshape(n, modes * len(own), m)
+        root = root.reshape(n, modes * len(exact_root), m)
         known = products(root, root) + exact
         weighted = jnp.sqrt(p_new)[..., None] * g
         newest = known - products(weighted, weighted) + products(a[:, None], a[:, None])
@@ -110,7 +112,8 @@ def information_increments(
         apart = backward[:, 1:, 1:] - backward[:, 1:, :1]
         kept = jnp.einsum("nrs,nrwm->nswm", apart, older)
         d = jnp.concatenate([(g[:, 1:] - g[:, :1])[:, :, None], kept], 2)
-        return (p_new, law, d, x), (table, mean(a))
+        own_scores = jnp.einsum("nr,nrcm->ncm", p_new, roots[:, :, density]).reshape(n, int(density.sum()) * m)
+        return (p_new, law, d, x), (table, mean(jnp.concatenate([a, own_scores], -1)))
 
     first = (
         jnp.broadcast_to(jnp.asarray(part.start), (n, modes)),

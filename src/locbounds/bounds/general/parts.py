@@ -77,6 +77,11 @@ class Part(eqx.Module):
             roots.append(jnp.stack(root) if root else jnp.zeros((0, gradient.size)))
         return jnp.stack(values), jnp.stack(gradients), jnp.stack(roots)
 
+    def densities(self) -> np.ndarray:
+        """Which roots are scores of densities that the user wrote."""
+        own = [not channel.exact_information for channel in self.channels]
+        return np.array(own + [True] * isinstance(self.motion, DensityMotion), dtype=bool)
+
     def exact_roots(self) -> np.ndarray:
         """Which roots the mode's own law weighs: those that do not depend on the measurement, nor on the mode."""
         own = [channel.exact_information and self.motion is None for channel in self.channels]
