@@ -1,5 +1,7 @@
 """The general engine: any jump-Markov model, the same precision control as the separated one."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -13,7 +15,8 @@ from locbounds.bounds.general.frame import Frame, Tables, beyond_reference, fram
 from locbounds.bounds.general.increments import information_increments
 from locbounds.bounds.general.parts import Part
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
-from locbounds.bounds.recursion import LinearModel, covariance_deviations, covariance_recursion
+from locbounds.bounds.recursion import GivenIncrements, LinearModel, covariance_recursion
+from locbounds.bounds.truncation import extrapolated, shortened
 from locbounds.errors import InputError, RefusedError
 from locbounds.model import AdditiveChannel, JumpMarkov
 from locbounds.paths import draw_paths
@@ -25,7 +28,6 @@ PATHS = 64  # per group and block
 FIRST_WINDOW = 12
 FEWEST_GROUPS = 16
 TABLE_BYTES = 2.5e8
-GROUPS_AT_ONCE = 8
 SCORE_SIGMAS = 6.0  # mean scores further from zero than this: density and sampler do not belong together
 
 
@@ -60,51 +62,34 @@ def _by_part(model: JumpMarkov, parts: list[Part], z: tuple[Array, ...]) -> list
 
 
 @eqx.filter_jit
-def _covariances(linear: LinearModel, increments: Array) -> Float[Array, "times state state"]:
-    return covariance_recursion(linear, increments)
+def _recursion(linear: LinearModel, mean: Array, changes: Array) -> tuple[Array, Array]:
+    return covariance_recursion(linear, GivenIncrements(mean, changes))
 
 
-@eqx.filter_jit
-def _some_deviations(linear: LinearModel, mean: Array, changes: Array) -> Float[Array, "groups times state state"]:
-    return covariance_deviations(linear, mean, changes)
+class _Solution(NamedTuple):
+    """The bound, and its first-order changes with windows that are shorter by a quarter and by a half."""
+
+    estimate: Estimate
+    shorter: Float[Array, "2 times"]
 
 
-def _estimate(model: JumpMarkov, what: Frame, linear: LinearModel, tables: Tables) -> Estimate:
+def _solve(model: JumpMarkov, what: Frame, linear: LinearModel, tables: Tables, window: int) -> _Solution:
+    """The bound from the means of all groups, and each group's change of it (delta method)."""
     beyond = beyond_reference(model, what, linear, tables)
     mean = beyond.mean(0)
-    changes = beyond - mean
+    cuts = []
+    for kept in shortened(window):
+        kept = np.pad(kept, (mean.shape[1] - window, 0), constant_values=True)  # with lag 1 the newest two ages are one
+        cuts.append(mean * (kept[:, None, None, None] & kept[:, None]))
+    P, changes = _recursion(linear, mean, jnp.concatenate([beyond, jnp.stack(cuts)]) - mean)
+    deviations, shorter = changes[:-2], changes[-2:]
     index = np.array(model.position_index)
-    P = _covariances(linear, mean)
-    deviations = jnp.concatenate(
-        [
-            _some_deviations(linear, mean, changes[g : g + GROUPS_AT_ONCE])[..., index, index].sum(-1)
-            for g in range(0, len(changes), GROUPS_AT_ONCE)
-        ]
-    )
     if isinstance(model.prior, DensityPrior):
         P0 = jnp.linalg.inv(tables.prior.mean(0))
         change = -jnp.einsum("ab,gbc,cd->gad", P0, tables.prior - tables.prior.mean(0), P0)
         P = P.at[0].set(P0)
         deviations = deviations.at[:, 0].set(change[:, index, index].sum(-1))
-    return Estimate(P, P[:, index, index].sum(-1), deviations)
-
-
-def _truncation(model: JumpMarkov, what: Frame, linear: LinearModel, tables: Tables, window: int) -> float:
-    """As for the separated engine: extrapolated from windows shortened by a quarter and by a half."""
-    index = np.array(model.position_index)
-    mean = beyond_reference(model, what, linear, tables).mean(0)
-    ages = mean.shape[1]
-
-    def rmse(length):
-        kept = np.arange(ages) < length + ages - window
-        both = kept[:, None, None, None] & kept[None, None, :, None]
-        return jnp.sqrt(_covariances(linear, jnp.where(both, mean, 0.0))[:, index, index].sum(-1))
-
-    full = rmse(window)
-    quarter, half = (float(jnp.max(jnp.abs(rmse(-(-n * window // 4)) / full - 1))) for n in (3, 2))
-    left_out = 4 * (model.steps - window) / window
-    beyond = quarter / (half - 2 * quarter) if half > 2 * quarter else np.inf
-    return quarter * max(1.0, min(beyond, left_out))
+    return _Solution(Estimate(P, P[:, index, index].sum(-1), deviations), shorter)
 
 
 def general(
@@ -142,26 +127,28 @@ def general(
         first_block = draw(0)
         _check_finite(first_block)
         linear = linear_model(model, what, first_block)
+        solution = _solve(model, what, linear, first_block, size)
         truncation = 0.0 if size == model.steps else np.nan
         if window is None and size < model.steps:
-            truncation = _truncation(model, what, linear, first_block, size)
+            truncation = extrapolated(solution.shorter, solution.estimate.position_mse, size, model.steps)
             if truncation > rtol_target / 10:
                 size = min(2 * size, model.steps)
                 continue
         break
-    last: list[Tables] = []
+    last = [first_block]
 
     def evaluate(tables: Tables) -> Estimate:
         last[:] = [tables]
-        return _estimate(model, what, linear, tables)
+        return _solve(model, what, linear, tables, size).estimate
 
     estimate, done = refine(
-        lambda block: draw(block) if block else first_block,
+        draw,
         evaluate,
         rtol=rtol_target,
         blocks=None if samples is None else -(-samples // (groups * PATHS)),
         samples_per_block=groups * PATHS,
         progress=progress,
+        first=(first_block, solution.estimate),
     )
     strange = _mean_scores(last[0])
     diagnostics = {

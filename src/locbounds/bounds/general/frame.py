@@ -112,7 +112,8 @@ def linear_model(model: JumpMarkov, frame: Frame, first: Tables) -> LinearModel:
         newest = np.asarray(first.increments.mean(0)[:, :2, :, :2, :]).reshape(-1, 2 * n, 2 * n)
         Q = np.stack([_inverse(J[:n, :n], f"the motion's log-density at step {k}") for k, J in enumerate(newest, 1)])
         reference = Reference(-Q @ newest[:, :n, n:], Q)
-    return LinearModel(jnp.asarray(reference.F), jnp.asarray(reference.Q), jnp.asarray(P0), frame.components)
+    F, Q = jnp.asarray(reference.F), jnp.asarray(reference.Q)
+    return LinearModel(F, Q, jnp.asarray(P0), frame.components, model.position_index)
 
 
 def beyond_reference(
