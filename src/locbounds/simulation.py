@@ -1,7 +1,7 @@
 """Drawing tracks, sight conditions and measurements from a scenario."""
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -134,7 +134,7 @@ def _draw_block(scenario: Scenario, seed: Array, block: Array, runs: int) -> Dra
 
 
 @eqx.filter_jit
-def _draw_general_block(model: JumpMarkov, seed: Array, block: Array, runs: int) -> Draws:
+def _draw_general_block(model: Any, seed: Any, block: Any, runs: int) -> Draws:
     paths = draw_paths(model, seed, block, runs)
     z = [
         z if channel.reports is None else jnp.where(jnp.asarray(channel.reports)[:, None], z, jnp.nan)
