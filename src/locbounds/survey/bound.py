@@ -12,7 +12,7 @@ right end of an interval is a lower one on all of it.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,23 +20,15 @@ from locbounds.axes import Float, ndarray
 from locbounds.errors import InputError, RefusedError
 from locbounds.registry import method
 from locbounds.survey.assignment import Matching
-from locbounds.survey.candidates import Candidates, find_candidates
+from locbounds.survey.candidates import SEGMENTS, Candidates, find_candidates
 from locbounds.survey.model import SurveyModel
 from locbounds.survey.solvers import AllPairs, SomePairs
 from locbounds.verdict import Status, Verdict
 
 ALL_PAIRS = 600  # up to so many points every pair takes part
 AXES = ("x", "y", "z")
-RTOL = 5e-3
-LEVELS = 48  # distances at which an assignment is solved, at most
-
-
-class _Solver(Protocol):
-    distances: ndarray | None
-
-    def solve(self, h: float) -> Matching: ...
-
-    def pairs(self) -> float: ...
+RTOL, LEVELS = 5e-3, 48  # of a small survey: distances at which an assignment is solved, at most
+LARGE_RTOL, LARGE_LEVELS = 2e-2, 16  # of a large one
 
 
 class Part(NamedTuple):
@@ -49,7 +41,7 @@ class Part(NamedTuple):
     ziv_zakai_m2, pairs_m2 : float
         The integral over assignments; the bound of a helper who names two points (:mod:`locbounds.survey.pairs`).
     lost_to_grid_m2, lost_to_pairs_m2 : float
-        By how much a finer grid of distances, and more pairs or a better matching, could raise the integral at most.
+        By how much a finer grid of distances, and more pairs or better matchings, could raise ``mse_m2`` at most.
     matchings : tuple of Matching
         Certificates, by increasing distance.
     """
@@ -117,8 +109,8 @@ class SurveyBound(NamedTuple):
 def survey_bound(
     model: SurveyModel,
     *,
-    rtol: float = RTOL,
-    levels: int = LEVELS,
+    rtol: float | None = None,
+    levels: int | None = None,
     candidates: dict[int, Candidates] | None = None,
     scale: float = 1.0,
 ) -> SurveyBound:
@@ -129,9 +121,10 @@ def survey_bound(
     model
         Points, mean fingerprints and noise.
     rtol
-        Distances are added until a finer grid could raise the mean square error by no more than this share.
+        Distances are added until a finer grid could raise the mean square error by no more than this share; by
+        default 0.005, and 0.02 for a large survey.
     levels
-        Distances at most, per axis.
+        Distances at most, per axis; by default 48, and 16 for a large survey.
     candidates
         Of :func:`survey_candidates`, if they are to be used for several noise levels; by default they are found here
         when the survey has more than 600 points (up to that, all pairs take part).
@@ -167,6 +160,9 @@ def survey_bound(
     >>> round(bound.axes["x"].mse_m2, 3), bound.verdict.status.value
     (1.5, 'valid under')
     """
+    large = candidates is not None or model.points > ALL_PAIRS
+    rtol = (LARGE_RTOL if large else RTOL) if rtol is None else rtol
+    levels = (LARGE_LEVELS if large else LEVELS) if levels is None else levels
     if not (0 < rtol < 1):
         raise InputError(f"rtol is {rtol:g}", "Give a number between 0 and 1")
     if not (np.isfinite(scale) and scale > 0):
@@ -175,11 +171,11 @@ def survey_bound(
     if verdict.status is Status.REFUSED:
         raise RefusedError("; ".join(verdict.reasons), "See locbounds explain survey")
     x, place = model.whitened, model.position_m
-    if candidates is None and model.points > ALL_PAIRS:
+    if candidates is None and large:
         candidates = survey_candidates(model)
     moving = [k for k in range(place.shape[1]) if np.ptp(place[:, k]) > 0]
 
-    def solver(axis: int | None) -> _Solver:
+    def solver(axis: int | None) -> AllPairs | SomePairs:
         if candidates is None:
             return AllPairs(x / scale, place, axis)
         return SomePairs(x, place, candidates, axis, scale)
@@ -197,13 +193,15 @@ def survey_bound(
 def survey_candidates(model: SurveyModel) -> dict[int, Candidates]:
     """Candidates along every axis of a large survey, for several calls of :func:`survey_bound`."""
     place = model.position_m
+    if model.points < 2 * SEGMENTS:
+        raise InputError(f"the survey has {model.points} points", "Leave candidates out: all pairs take part then")
     axes = [k for k in range(place.shape[1]) if np.ptp(place[:, k]) > 0]
     return {k: find_candidates(model.whitened, place, k) for k in axes}
 
 
 
 
-def integrate(solver: _Solver, reach_m: float, *, rtol: float = RTOL, levels: int = LEVELS) -> Part:
+def integrate(solver: AllPairs | SomePairs, reach_m: float, *, rtol: float = RTOL, levels: int = LEVELS) -> Part:
     """``1/2 int h A(h) dh`` from below, on a grid that is refined where it loses most.
 
     Parameters
@@ -245,7 +243,11 @@ def integrate(solver: _Solver, reach_m: float, *, rtol: float = RTOL, levels: in
     grid_loss = float(np.sum(np.where(exact, 0.0, before - low) * area))
     most = float(np.sum(np.where(exact, up, np.concatenate([up[:1], up[:-1]])) * area))
     value = float(np.sum(low * area))
-    return Part(value, solver.pairs(), grid_loss, max(most - value - grid_loss, 0.0), tuple(solved[h] for h in grid))
+    pairs, most_pairs = solver.pairs()
+    best = max(value, pairs)
+    grid_loss = min(grid_loss, max(value + grid_loss - best, 0.0))
+    pair_loss = max(most, most_pairs) - best - grid_loss
+    return Part(value, pairs, grid_loss, max(pair_loss, 0.0), tuple(solved[h] for h in grid))
 
 
 def _nonincreasing(values: list[float]) -> Float[ndarray, " n"]:

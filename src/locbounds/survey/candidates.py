@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from locbounds.axes import Float, Int, ndarray
-from locbounds.survey.assignment import confusion
 
 ROWS = 256  # points compared with all others at once
 SEGMENTS = 24  # of the points, sorted along the axis; every point keeps candidates in each of them
 KEEP = 8  # candidates of a point in each segment
-ROUNDING = 1e-12  # relative to the largest squared norm: what a squared distance from a matrix product may lack
+ROUNDING = 2e-6  # relative to the largest squared norm: what a single-precision squared distance may be too large by
 
 
 class Candidates(NamedTuple):
@@ -23,7 +22,8 @@ class Candidates(NamedTuple):
     column : int array [points, k]
         Candidates; the point itself where there are fewer.
     square : array [points, k]
-        Squared distances of the whitened fingerprints; inf where there is no candidate.
+        Squared distances of the whitened fingerprints, in single precision and rather too small than too large; inf
+        where there is no candidate. They rank the candidates; a bound takes the exact ones of what it matches.
     left_out : array [points, segments]
         Every pair that was left out is at least so far apart (squared); inf: none was left out.
     low, high : arrays [segments, space]
@@ -41,9 +41,6 @@ def find_candidates(
     whitened: Float[ndarray, "points columns"],
     position_m: Float[ndarray, "points space"],
     axis: int,
-    *,
-    keep: int = KEEP,
-    segments: int = SEGMENTS,
 ) -> Candidates:
     """Compare every point with all that have a larger coordinate, and keep the most similar ones.
 
@@ -55,22 +52,20 @@ def find_candidates(
         [points, space] m.
     axis
         The coordinate.
-    keep, segments
-        The points are cut into ``segments`` equal parts along the axis; ``keep`` candidates stay in each, so that
-        there are some at every distance.
 
     Notes
     -----
-    Memory grows with points * (columns + keep * segments), time with points squared * columns (one matrix product).
+    The points are cut into 24 equal parts along the axis; 8 candidates stay in each, so that there are some at every
+    distance. Memory grows with points * (columns + 192), time with points squared * columns (half a matrix product).
     """
+    keep, segments = KEEP, SEGMENTS
     n = len(whitened)
     order = np.argsort(position_m[:, axis], kind="stable")
-    x, place = whitened[order], position_m[order]
+    place = position_m[order]
     coordinate = np.ascontiguousarray(place[:, axis])
-    square = np.einsum("ij,ij->i", x, x)
-    slack = ROUNDING * float(square.max())
-    edges = np.linspace(0, n, min(segments, n) + 1).astype(int)
-    parts = list(zip(edges[:-1], edges[1:], strict=True))
+    left, right = _factors(whitened[order])
+    edges = np.linspace(0, n, segments + 1).astype(int)
+    parts = list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
     column = np.repeat(np.arange(n, dtype=np.int32)[:, None], keep * len(parts), axis=1)
     found = np.full(column.shape, np.inf, np.float32)
     left_out = np.full((n, len(parts)), np.inf, np.float32)
@@ -78,12 +73,7 @@ def find_candidates(
         rows = slice(start, min(start + ROWS, n))
         first = int(np.searchsorted(edges, start, side="right")) - 1
         base = edges[first]
-        d = x[rows] @ x[base:].T
-        d *= -2.0
-        d += square[rows, None]
-        d += square[base:]
-        d -= slack
-        np.maximum(d, 0.0, out=d)
+        d = left[rows] @ right[base:].T
         here = int(np.searchsorted(coordinate, coordinate[rows][-1], side="right"))
         near = slice(0, here - base)
         d[:, near][coordinate[base:here] <= coordinate[rows, None]] = np.inf
@@ -94,14 +84,14 @@ def find_candidates(
             if size > keep:
                 nearest = np.argpartition(part, keep, axis=1)[:, : keep + 1]
                 values = np.take_along_axis(part, nearest, axis=1)
-                left_out[rows, s] = values[:, keep]
+                left_out[rows, s] = np.maximum(values[:, keep], 0.0)
                 nearest, values = nearest[:, :keep], values[:, :keep]
             else:
                 nearest, values = np.broadcast_to(np.arange(size), part.shape), part
             at = slice(s * keep, s * keep + values.shape[1])
             there = np.isfinite(values)
             column[rows, at] = np.where(there, nearest + low, column[rows, at])
-            found[rows, at] = values
+            found[rows, at] = np.maximum(values, 0.0)
     back = np.empty(n, int)
     back[order] = np.arange(n)
     boxes = [(place[low:high].min(axis=0), place[low:high].max(axis=0)) for low, high in parts]
@@ -114,24 +104,20 @@ def find_candidates(
     )
 
 
-def left_out_weight(
-    candidates: Candidates, position_m: Float[ndarray, "points space"], h: float, axis: int | None
-) -> Float[ndarray, " points"]:
-    """The largest 2 P of a pair that was left out and could be h apart, per point.
+def _factors(x: ndarray) -> tuple[ndarray, ndarray]:
+    """Matrices whose product holds all squared distances, less what rounding may add to one."""
+    x = x - x.mean(axis=0)
+    square = np.einsum("ij,ij->i", x, x)[:, None]
+    one = np.ones_like(square)
+    left = np.hstack([-2 * x, square - ROUNDING * square.max(), one])
+    return left.astype(np.float32), np.hstack([x, one, square]).astype(np.float32)
 
-    Parameters
-    ----------
-    candidates, position_m
-        As found.
-    h
-        Distance, m.
-    axis
-        Along this coordinate; None: the length.
-    """
-    if axis is None:
-        far = np.maximum(np.abs(position_m[:, None] - candidates.low), np.abs(position_m[:, None] - candidates.high))
-        reach = np.linalg.norm(far, axis=-1)
-    else:
-        reach = candidates.high[:, axis] - position_m[:, axis, None]
-    least = np.where(reach >= h, candidates.left_out, np.inf).min(axis=1)
-    return 2 * confusion(np.sqrt(least.astype(float)))
+
+def reach(
+    candidates: Candidates, position_m: Float[ndarray, "points space"], axis: int | None
+) -> Float[ndarray, "points segments"]:
+    """How far the points of each segment can be from each point, m: along an axis, or (None) in all."""
+    if axis is not None:
+        return candidates.high[:, axis] - position_m[:, axis, None]
+    far = np.maximum(np.abs(position_m[:, None] - candidates.low), np.abs(position_m[:, None] - candidates.high))
+    return np.linalg.norm(far, axis=-1)

@@ -165,13 +165,13 @@ class Fingerprints:
             [columns] deviation of the noise; zero asks for equal differences.
         """
         heard, value = self.heard, self.value.copy()
-        order = np.argsort(-heard.sum(axis=0), kind="stable")
+        order = np.argsort(-heard.sum(axis=0), kind="stable").tolist()
         keep: list[int] = []
         twins: dict[int, list[str]] = {}
         for k in order:
-            first = next((j for j in keep if self._same(heard, j, int(k), deviation)), None)
+            first = next((j for j in keep if self._same(heard, j, k, deviation)), None)
             if first is None:
-                keep.append(int(k))
+                keep.append(k)
                 continue
             twins.setdefault(first, []).append(self.names[k])
             both = heard[:, first] & heard[:, k]
@@ -191,7 +191,7 @@ class Fingerprints:
         if 2 * together <= int((heard[:, i] | heard[:, j]).sum()):
             return False
         difference = self.value[both, i] - self.value[both, j]
-        return float(np.var(difference)) <= (deviation[i] ** 2 + deviation[j] ** 2) / 2
+        return bool(np.var(difference) <= (deviation[i] ** 2 + deviation[j] ** 2) / 2)
 
 
 def _list(names: list[str], most: int = 8) -> str:

@@ -99,7 +99,7 @@ def estimate_noise(survey: Fingerprints, *, shape: str = "each", given_db: float
     >>> where = np.repeat(np.arange(50.0), 4)[:, None]
     >>> heard = np.column_stack([where[:, 0] + 2 * rng.standard_normal(200), 3 * rng.standard_normal(200)])
     >>> estimate_noise(Fingerprints.at(where, heard)).deviation.round(1).tolist()
-    [2.1, 3.0]
+    [1.9, 3.0]
     """
     if shape not in SHAPES:
         raise InputError(f'the shape of the noise is "{shape}"', f"Choose one of {', '.join(SHAPES)}")

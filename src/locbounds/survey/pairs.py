@@ -25,7 +25,7 @@ def spread(distance: Float[ndarray, "*n"]) -> Float[ndarray, "*n"]:
     ``g(d) = 1/4 exp(-d^2 / 8) E[1 / cosh(d t / 2)]`` with a standard normal t.
 
     >>> spread(np.array([0.0, 1.0, 70.0])).round(4).tolist()
-    [0.25, 0.1995, 0.0]
+    [0.25, 0.199, 0.0]
     """
     nodes, values = _table()
     inside = np.exp(np.interp(distance, nodes, values)) * (1 - _ROUNDING)
