@@ -24,6 +24,7 @@ LEVELS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 16.0)  # the same withou
 LARGE_LEVELS = (1.0, 2.0, 4.0)  # of a large survey, relative to its noise
 DRAWS = 20_000
 LARGE_DRAWS = 2_000  # of a survey with more points than all pairs are taken of
+VISIBLE = 0.01  # of the extent: an error that a map can show
 NAMES = {
     "survey": "rigorous bound",
     "survey-length": "rigorous bound on the length",
@@ -38,6 +39,7 @@ NAMES = {
     "mmse-gp": "least error on the interpolated map",
 }
 COLUMNS = ("method", "noise_db", "rmse_m", "stderr_m", "valid")
+CURVE_COLUMNS = ("set", "method", "noise_db", "noise_factor", "rmse_m", "stderr_m", "valid")
 
 
 class Row(NamedTuple):
@@ -62,7 +64,11 @@ class SurveyStudy(NamedTuple):
         At that level; over levels.
     held_out : dict
         Errors of every estimator on held-out samples.
+    visible, visible_factor : DiscreteMmse, float
+        The least error at the lowest noise level, relative to the survey's, at which it is one per cent of the survey's
+        extent or more: what a map of it shows.
     ranking : tuple of Importance
+        At that level.
     notes : tuple of str
     """
 
@@ -72,6 +78,8 @@ class SurveyStudy(NamedTuple):
     rows: tuple[Row, ...]
     curve: tuple[Row, ...]
     held_out: dict[str, Errors]
+    visible: DiscreteMmse
+    visible_factor: float
     ranking: tuple[Importance, ...]
     notes: tuple[str, ...]
 
@@ -167,8 +175,23 @@ def study(
         announce(f"noise level {factor:.3g} of the survey's")
         curve += _at_level(model, candidates, estimators, factor, large, seed)
     announce("which access points matter")
-    ranking = tuple(access_points(model, bound)) if len(model.names) > 1 else ()
-    return SurveyStudy(model, bound, least, tuple(rows), tuple(curve), errors, ranking, tuple(notes))
+    factor, seen = _visible(model, least, curve, large, seed)
+    at_factor = bound if factor == 1 or not large else survey_bound(model, candidates=candidates, scale=factor)
+    ranking = tuple(access_points(model, at_factor, scale=factor)) if len(model.names) > 1 else ()
+    return SurveyStudy(
+        model, bound, least, tuple(rows), tuple(curve), errors, seen, factor, ranking, tuple(dict.fromkeys(notes))
+    )
+
+
+def _visible(model, least: DiscreteMmse, curve, large: bool, seed: int) -> tuple[float, DiscreteMmse]:
+    smallest = VISIBLE * float(np.linalg.norm(np.ptp(model.position_m, axis=0)))
+    if least.rmse_m >= smallest:
+        return 1.0, least
+    higher = sorted((r.rmse_m < smallest, r.factor) for r in curve if r.method == "mmse" and r.factor > 1)
+    if not higher:
+        return 1.0, least
+    factor = higher[0][1] if not higher[0][0] else higher[-1][1]
+    return factor, discrete_mmse(model, draws=LARGE_DRAWS if large else DRAWS, seed=seed, scale=factor)
 
 
 def _in_words(model: SurveyModel) -> str:
@@ -247,3 +270,35 @@ def _at_level(model, candidates, estimators, factor: float, large: bool, seed: i
     return rows
 
 
+
+
+def curve_rows(name: str, found: SurveyStudy) -> list[tuple]:
+    """The curve as rows of :data:`CURVE_COLUMNS`, then the estimators on held-out samples."""
+    rows = [*found.curve, *(r for r in found.rows if r.method in found.held_out)]
+    return [(name, r.method, r.noise_db, r.factor, r.rmse_m, r.stderr_m, r.valid) for r in rows]
+
+
+def name_of(method: str) -> str:
+    """What a method is, in words.
+
+    >>> name_of("survey-x")
+    'rigorous bound along x'
+    """
+    return NAMES.get(method) or f"rigorous bound along {method.rpartition('-')[2]}"
+
+
+def in_metres(row: Row) -> str:
+    """RMSE with its standard error, for people."""
+    if row.rmse_m < 1e-3:
+        return "below 1 mm"
+    return f"{row.rmse_m:.3f} m" + (f" ± {row.stderr_m:.3f}" if row.stderr_m > 0 else "")
+
+
+def lost_in_words(bound: SurveyBound) -> str:
+    """How much finer distances, more pairs or better matchings could raise the bound."""
+    most = float(np.sqrt(bound.mse_m2 + bound.lost_to_grid_m2 + bound.lost_to_pairs_m2))
+    grid = float(np.sqrt(bound.mse_m2 + bound.lost_to_grid_m2)) - bound.rmse_m
+    return (
+        f"Lost to the grid of distances: at most {grid:.3g} m; to pairs left out and to unfinished matchings: at most "
+        f"{most - grid - bound.rmse_m:.3g} m."
+    )
