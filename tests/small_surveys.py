@@ -10,7 +10,7 @@ from locbounds.survey import Fingerprints, survey_model
 def small_survey(rng, *, points=None, columns=None, space=None, noise_db=1.0):
     """A random survey of few points with one or two access points, from hopeless to clear."""
     n = points or int(rng.integers(2, 8))
-    m = columns or int(rng.integers(1, 3))
+    m = columns or (2 if rng.random() < 0.2 else 1)
     s = space or int(rng.integers(1, 4))
     place = rng.integers(0, 4, (n, s)) if rng.random() < 0.3 else rng.normal(size=(n, s)) * rng.choice([0.3, 1, 5])
     place = place + 1e-3 * np.arange(n)[:, None]  # no two equal
@@ -44,6 +44,4 @@ def exact_mmse(model, scale=1.0):
 def best_injection(weight, allowed):
     """The largest sum of weights over all partial injections."""
     n = len(weight)
-    return max(
-        sum(weight[i, j] for i, j in enumerate(p) if allowed[i, j]) for p in itertools.permutations(range(n))
-    )
+    return max(sum(weight[i, j] for i, j in enumerate(p) if allowed[i, j]) for p in itertools.permutations(range(n)))

@@ -7,6 +7,7 @@ from .filters import Estimates, FactorisedImmEkf, ImmEkf, ImmKf, OracleEkf
 from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
+from .io.surveys import read_survey
 from .measurement import Range
 from .motion import ConstantVelocity
 from .noise import Gaussian, GaussianMixture
@@ -17,6 +18,7 @@ from .result import Result, tightest
 from .scenario import Link, Scenario
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
+from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
 
 __version__: str
@@ -27,6 +29,7 @@ __all__ = [
     "DwellSight",
     "Estimates",
     "FactorisedImmEkf",
+    "Fingerprints",
     "Gaussian",
     "GaussianMixture",
     "GaussianPrior",
@@ -47,6 +50,7 @@ __all__ = [
     "Times",
     "bcrb",
     "bcrb_algorithm1",
+    "discrete_mmse",
     "enumer",
     "evaluate",
     "explain",
@@ -58,7 +62,10 @@ __all__ = [
     "plot",
     "quantile",
     "read_log",
+    "read_survey",
     "save",
     "simulate",
+    "survey_bound",
+    "survey_model",
     "tightest",
 ]

@@ -121,13 +121,13 @@ METHODS: dict[str, Method] = {
             "survey",
             "Survey bound",
             "bound",
-            "Discrete Ziv-Zakai bound of a fingerprint survey: no estimator that sees one fingerprint has a smaller mean "
-            "square error over the surveyed points.",
+            "Discrete Ziv-Zakai bound of a fingerprint survey: no estimator that sees one fingerprint has a smaller "
+            "mean square error over the surveyed points.",
             FINGERPRINT,
             "locbounds.survey:survey_bound",
             (),
-            "Goes to zero with the noise, while the error between surveyed points does not; a survey of few noisy samples "
-            "makes points look more different than they are.",
+            "Goes to zero with the noise, while the error between surveyed points does not; a survey of few noisy "
+            "samples makes points look more different than they are.",
             ("mcguire2009", "bell1997"),
             (SURVEYED,),
             (

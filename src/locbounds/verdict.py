@@ -78,7 +78,9 @@ def judge(
     if violations:
         return Verdict(Status.REFUSED, violations)
     status = Status.CONDITIONAL if conditions else Status.VALID
-    return Verdict(status, conditions or grounds, dangers(subject) if isinstance(subject, Scenario) else subject.dangers())
+    return Verdict(
+        status, conditions or grounds, dangers(subject) if isinstance(subject, Scenario) else subject.dangers()
+    )
 
 
 def regular_noise(scenario: Scenario) -> str | None:

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from scipy.special import ndtr
 from scipy.spatial.distance import cdist
+from scipy.special import ndtr
 
-from small_surveys import best_injection, exact_mmse, small_survey
 from locbounds.survey import Fingerprints, printed_mse, survey_bound, survey_candidates, survey_model
 from locbounds.survey.bound import integrate
 from locbounds.survey.pairs import spread
 from locbounds.survey.solvers import AllPairs, SomePairs
+from small_surveys import best_injection, exact_mmse, small_survey
 
 SURVEYS = 1_000
 ROUNDING = 1e-9  # relative; the quadrature is exact to that

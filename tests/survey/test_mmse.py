@@ -5,9 +5,9 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import norm
 
-from small_surveys import exact_mmse, small_survey
 from locbounds.survey import Fingerprints, survey_model
 from locbounds.survey.mmse import discrete_mmse
+from small_surveys import exact_mmse, small_survey
 
 FALSE_ALARMS = 1e-3
 

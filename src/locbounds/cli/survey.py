@@ -43,10 +43,16 @@ def survey(
         float | None, typer.Option("--not-heard", metavar="VALUE", help="Code for not heard, besides an empty cell.")
     ] = None,
     silence: Annotated[
-        str, typer.Option("--silence", metavar="level|censored", help="What not heard means: a reading at the weakest level, or censored below it.")
+        str,
+        typer.Option(
+            "--silence",
+            metavar="level|censored",
+            help="What not heard means: a reading at the weakest level, or censored below it.",
+        ),
     ] = "level",
     noise_shape: Annotated[
-        str, typer.Option("--noise-shape", metavar="common|each|full", help="One deviation, one per column, or correlated.")
+        str,
+        typer.Option("--noise-shape", metavar="common|each|full", help="One deviation, one per column, or correlated."),
     ] = "each",
     merge: Annotated[
         float | None, typer.Option("--merge", metavar="M", help="Merge samples within cells of so many metres.")
@@ -89,34 +95,34 @@ def survey(
         "milliwatts": mw,
         "flat": flat,
     }
-    with output_folder(default_out(fingerprints.name.split(".")[0], out), force=force) as folder:
-        with status("reading") as say:
-            read = read_survey(fingerprints, points=points, select=select, **options)
-            other = test if not test.endswith((".csv", ".csv.gz")) else read_survey(test, **options).survey
-            found = about.study(
-                read.survey,
-                read.labels,
-                test=other,
-                noise_db=level,
-                shape=noise_shape,
-                silence=silence,
-                merge_m=merge,
-                neighbours=neighbours,
-                twins=keep_twins,
-                map=map,
-                seed=seed,
-                announce=say,
-            )
-            rows = [(r.method, r.noise_db, r.rmse_m, r.stderr_m, r.valid) for r in found.rows]
-            folder.write_text("survey.csv", csv_text(about.COLUMNS, _without_nan(rows)))
-            ranking = [(a.name, a.unit, a.heard, a.deviation, a.rmse_without_m, a.rise_m) for a in found.ranking]
-            names = ("access_point", "unit", "heard_share", "noise", "rmse_without_m", "rise_m")
-            folder.write_text("access_points.csv", csv_text(names, ranking))
-            title = fingerprints.name + (f", {select}" if select else "")
-            folder.write("map.png", lambda path: survey_plot.where_it_fails(found, title=title).savefig(path, dpi=150))
-            folder.write_text("fig9.csv", csv_text(about.CURVE_COLUMNS, _without_nan(about.curve_rows(title, found))))
-            figure = survey_plot.curve({title: (found.curve, found.rows)})
-            folder.write("fig9.png", lambda path: figure.savefig(path, dpi=150))
+    where = default_out(fingerprints.name.split(".")[0], out)
+    with output_folder(where, force=force) as folder, status("reading") as say:
+        read = read_survey(fingerprints, points=points, select=select, **options)
+        other = test if not test.endswith((".csv", ".csv.gz")) else read_survey(test, **options).survey
+        found = about.study(
+            read.survey,
+            read.labels,
+            test=other,
+            noise_db=level,
+            shape=noise_shape,
+            silence=silence,
+            merge_m=merge,
+            neighbours=neighbours,
+            twins=keep_twins,
+            map=map,
+            seed=seed,
+            announce=say,
+        )
+        rows = [(r.method, r.noise_db, r.rmse_m, r.stderr_m, r.valid) for r in found.rows]
+        folder.write_text("survey.csv", csv_text(about.COLUMNS, _without_nan(rows)))
+        ranking = [(a.name, a.unit, a.heard, a.deviation, a.rmse_without_m, a.rise_m) for a in found.ranking]
+        names = ("access_point", "unit", "heard_share", "noise", "rmse_without_m", "rise_m")
+        folder.write_text("access_points.csv", csv_text(names, ranking))
+        title = fingerprints.name + (f", {select}" if select else "")
+        folder.write("map.png", lambda path: survey_plot.where_it_fails(found, title=title).savefig(path, dpi=150))
+        folder.write_text("fig9.csv", csv_text(about.CURVE_COLUMNS, _without_nan(about.curve_rows(title, found))))
+        figure = survey_plot.curve({title: (found.curve, found.rows)})
+        folder.write("fig9.png", lambda path: figure.savefig(path, dpi=150))
     lost = about.lost_in_words(found.bound)
     if json:
         keys = about.COLUMNS
@@ -133,7 +139,7 @@ def survey(
         )
         return
     print_table(
-        f"{found.model.points:,} points, {found.model.samples:,} samples, {len(found.model.names)} columns: position RMSE",
+        f"Position RMSE: {found.model.points:,} points, {found.model.samples:,} samples, {len(found.model.names)} columns",
         ("method", "what", "RMSE", "valid"),
         [(r.method, about.name_of(r.method), about.in_metres(r), r.valid) for r in found.rows],
     )
@@ -141,7 +147,10 @@ def survey(
         "What the bound rises by without one access point"
         + (f", at {found.visible_factor:.2g} times this noise" if found.visible_factor != 1 else ""),
         ("access point", "heard at", "noise", "rise"),
-        [(a.name, f"{a.heard:.0%}", f"{a.deviation:.2g} {a.unit}", f"{a.rise_m:.3g} m") for a in found.ranking[:RANKED]],
+        [
+            (a.name, f"{a.heard:.0%}", f"{a.deviation:.2g} {a.unit}", f"{a.rise_m:.3g} m")
+            for a in found.ranking[:RANKED]
+        ],
     )
     for text in (*(f"valid under: {reason}" for reason in found.bound.verdict.reasons), lost, *found.notes):
         typer.echo(text)

@@ -80,7 +80,7 @@ def read_survey(
     select: str | None = None,
     access_points: str | None = None,
     values: str = "rss",
-    not_heard: float | None = None,
+    not_heard: float | int | None = None,
     milliwatts: bool = False,
     flat: bool = False,
 ) -> SurveyFile:
@@ -89,8 +89,8 @@ def read_survey(
     Parameters
     ----------
     path : path
-        CSV (also .gz). Wide: a line per sample and a column per access point, empty where it was not heard. Long: a line
-        per sample and access point, with the column ``anchor_id``.
+        CSV (also .gz). Wide: a line per sample and a column per access point, empty where it was not heard. Long: a
+        line per sample and access point, with the column ``anchor_id``.
     points : path, optional
         CSV with the position of every ``point_id``, where the samples have none.
     columns : SurveyColumns
@@ -98,7 +98,8 @@ def read_survey(
     select : str, optional
         ``"scene=office"``: only these rows, of every file that has the column; several separated by commas.
     access_points : str, optional
-        Columns of a wide file, for example ``"WAP*"``; by default the largest family of columns that differ in a number.
+        Columns of a wide file, for example ``"WAP*"``; by default the largest family of columns that differ in a
+        number.
     values : str
         ``"rss"``, ``"range"`` or ``"both"``; a wide file has RSS only.
     not_heard : float, optional
@@ -209,7 +210,9 @@ def _long(table: CsvTable, c: SurveyColumns, values: str) -> tuple[list[str], tu
         table.need(column, key)
     keys = [k for k in (c.group, c.point, c.sample, c.x, c.y) if k in table]
     text = [table.text(k) for k in keys]
-    rows = np.array(["\0".join(parts) for parts in zip(*text, strict=True)] if text else [""] * len(table), dtype=object)
+    rows = np.array(
+        ["\0".join(parts) for parts in zip(*text, strict=True)] if text else [""] * len(table), dtype=object
+    )
     _, first, sample = np.unique(rows, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty(len(order), int)
@@ -259,8 +262,8 @@ def _dbm(value: ndarray, milliwatts: bool, file: str, notes: list[str]) -> ndarr
     levels, count = np.unique(heard, return_counts=True)
     if len(levels) > 1 and levels[1] - levels[0] >= GAP_DB and count[0] > SHARE * len(heard):
         notes.append(
-            f"{count[0] / len(heard):.0%} of the values are {levels[0]:g} dBm and the next is {levels[1]:g}: if it is a "
-            f"code for not heard, give --not-heard {levels[0]:g}."
+            f"{count[0] / len(heard):.0%} of the values are {levels[0]:g} dBm and the next is {levels[1]:g}: if it is "
+            f"a code for not heard, give --not-heard {levels[0]:g}."
         )
     return value
 

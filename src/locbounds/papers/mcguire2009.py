@@ -37,12 +37,12 @@ class PublishedSurvey(NamedTuple):
 
 PUBLISHED_FIG9 = PublishedSurvey()
 REMARKS = (
-    f"The chapter: {PUBLISHED_FIG9.points} points, {PUBLISHED_FIG9.access_points} access points, {PUBLISHED_FIG9.noise_db} "
-    f"dB: RMSE {PUBLISHED_FIG9.rmse_m} m, its formula {PUBLISHED_FIG9.bound_m} m. The survey was not published, so that "
-    "these two numbers cannot be computed anew.",
-    "The chapter's formula (31) is not a lower bound; (32) prints sigma^2 where sigma is meant, which is what is computed.",
-    "The rigorous bound and the least error hold at the surveyed points: they vanish with the noise, while the error of "
-    "held-out points does not.",
+    f"The chapter: {PUBLISHED_FIG9.points} points, {PUBLISHED_FIG9.access_points} access points, "
+    f"{PUBLISHED_FIG9.noise_db} dB: RMSE {PUBLISHED_FIG9.rmse_m} m, its formula {PUBLISHED_FIG9.bound_m} m. The survey "
+    "was not published, so that these two numbers cannot be computed anew.",
+    "The chapter's formula (31) is not a lower bound; (32) prints sigma^2 where sigma is meant, and sigma is computed.",
+    "The rigorous bound and the least error hold at the surveyed points: they vanish with the noise, while the error "
+    "of held-out points does not.",
 )
 
 

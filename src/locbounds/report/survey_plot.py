@@ -36,7 +36,7 @@ def curve(sets: Mapping[str, tuple[Sequence[Row], Sequence[Row]]]) -> "Figure":
 
     across = min(len(sets), ACROSS)
     down = -(-len(sets) // across)
-    figure = Figure(figsize=(max(6.8, 4.0 * across), 1.0 + 3.8 * down), layout="constrained")
+    figure = Figure(figsize=(max(6.8, 4.0 * across), (1.0 if across > 2 else 1.6) + 3.8 * down), layout="constrained")
     panels = figure.subplots(down, across, squeeze=False, sharey=True).ravel()
     for axes in panels[len(sets) :]:
         axes.set_visible(False)
@@ -58,17 +58,28 @@ def curve(sets: Mapping[str, tuple[Sequence[Row], Sequence[Row]]]) -> "Figure":
         level = next((r.noise_db if in_db else 1.0 for r in own), None)
         if level is not None:
             axes.axvline(level, color="0.8", lw=1, zorder=0)
-            axes.text(level, 0.01, " this survey", transform=axes.get_xaxis_transform(), fontsize="x-small", color="0.4")
-        axes.set(yscale="log", xlabel="noise in dB" if in_db else "noise relative to this survey's", ylim=(SMALLEST_M, None))
+            axes.text(
+                level, 0.01, " this survey", transform=axes.get_xaxis_transform(), fontsize="x-small", color="0.4"
+            )
+        axes.set(yscale="log", xlabel="noise in dB" if in_db else "noise relative to this survey's")
         axes.set_title(title, loc="left", fontsize="medium")
         axes.grid(alpha=0.3, which="both")
+    largest = max(row.rmse_m for rows, own in sets.values() for row in (*rows, *own))
+    panels[0].set_ylim(SMALLEST_M, 1.5 * max(largest, 2 * SMALLEST_M))
     for axes in panels[::across]:
         axes.set_ylabel("position RMSE in m")
     handles: dict = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, frameon=False, fontsize="small")
+    figure.legend(
+        handles.values(),
+        handles.keys(),
+        loc="outside lower center",
+        ncols=4 if across > 2 else 2,
+        frameon=False,
+        fontsize="small",
+    )
     return figure
 
 
@@ -135,6 +146,8 @@ def _held_out(axes, errors: Errors, name: str, flat, size: float) -> None:
     rms = np.sqrt(np.bincount(index.reshape(-1), errors.square_m2) / count)
     places = where if where.shape[1] > 1 else np.column_stack([where, np.zeros(len(where))])
     axes.scatter(*flat[:, :2].T, c="0.85", s=size / 3, zorder=1)
-    points = axes.scatter(*places[:, :2].T, c=rms, s=size, cmap="viridis", vmin=0, vmax=np.quantile(rms, 0.98), zorder=2)
+    points = axes.scatter(
+        *places[:, :2].T, c=rms, s=size, cmap="viridis", vmin=0, vmax=np.quantile(rms, 0.98), zorder=2
+    )
     axes.figure.colorbar(points, ax=axes, label="RMS error in m", shrink=0.8, extend="max")
     axes.set_title(f"{name} (RMSE {errors.rmse_m:.2f} m)\ngrey: the survey's points", fontsize="medium")

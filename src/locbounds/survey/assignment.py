@@ -110,7 +110,8 @@ def auction(
 
     Examples
     --------
-    >>> match, u, v = auction(np.array([[3.0, 2], [2, 0]]), np.array([[0, 1], [0, 0]]), np.zeros(2), step=0.1, rounds=99)
+    >>> weight, column = np.array([[3.0, 2], [2, 0]]), np.array([[0, 1], [0, 0]])
+    >>> match, u, v = auction(weight, column, np.zeros(2), step=0.1, rounds=99)
     >>> match.tolist(), 4.0 <= float(u.sum() + v.sum()) <= 4.2
     ([1, 0], True)
     """

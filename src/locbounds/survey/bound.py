@@ -12,6 +12,7 @@ right end of an interval is a lower one on all of it.
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -112,7 +113,7 @@ def survey_bound(
     rtol: float | None = None,
     levels: int | None = None,
     candidates: dict[int, Candidates] | None = None,
-    scale: float = 1.0,
+    scale: float | int = 1.0,
 ) -> SurveyBound:
     """The rigorous bound on the mean square error of any estimator in a survey.
 
@@ -167,6 +168,7 @@ def survey_bound(
         raise InputError(f"rtol is {rtol:g}", "Give a number between 0 and 1")
     if not (np.isfinite(scale) and scale > 0):
         raise InputError(f"the noise scale is {scale:g}", "Give a positive number")
+    scale = float(scale)
     verdict = method("survey").verdict(model)
     if verdict.status is Status.REFUSED:
         raise RefusedError("; ".join(verdict.reasons), "See locbounds explain survey")
@@ -199,8 +201,6 @@ def survey_candidates(model: SurveyModel) -> dict[int, Candidates]:
     return {k: find_candidates(model.whitened, place, k) for k in axes}
 
 
-
-
 def integrate(solver: AllPairs | SomePairs, reach_m: float, *, rtol: float = RTOL, levels: int = LEVELS) -> Part:
     """``1/2 int h A(h) dh`` from below, on a grid that is refined where it loses most.
 
@@ -220,13 +220,15 @@ def integrate(solver: AllPairs | SomePairs, reach_m: float, *, rtol: float = RTO
     solved = {smallest: first}
     if top > smallest:
         solved[top] = solver.solve(top)
-    while len(solved) < levels:
+    if distances is not None and len(distances) <= levels:
+        solved = {h: solver.solve(h) for h in distances.tolist()}
+    while len(solved) < levels and (distances is None or len(solved) < len(distances)):
         grid = sorted(solved)
         low = _nonincreasing([solved[h].value for h in grid])
         area = np.diff(np.square([0.0, *grid])) / 4
         total = float(np.sum(low * area))
         gain = np.maximum(low[:-1] - low[1:], 0.0) * area[1:]
-        exact = np.array([_between(distances, a, b) == 0 for a, b in zip(grid, grid[1:], strict=False)], bool)
+        exact = np.array([_between(distances, a, b) == 0 for a, b in itertools.pairwise(grid)], bool)
         gain = np.where(exact, 0.0, gain) if len(gain) else gain
         if not len(gain) or gain.sum() <= rtol * total:
             break
@@ -238,7 +240,7 @@ def integrate(solver: AllPairs | SomePairs, reach_m: float, *, rtol: float = RTO
     up = np.minimum.accumulate([solved[h].upper for h in grid])
     area = np.diff(np.square([0.0, *grid])) / 4
     # On (a, b] A is at most its value just right of a: A(b) where no distance lies between, else A(a).
-    exact = np.array([True, *(_between(distances, a, b) == 0 for a, b in zip(grid, grid[1:], strict=False))])
+    exact = np.array([True, *(_between(distances, a, b) == 0 for a, b in itertools.pairwise(grid))])
     before = np.concatenate([low[:1], low[:-1]])
     grid_loss = float(np.sum(np.where(exact, 0.0, before - low) * area))
     most = float(np.sum(np.where(exact, up, np.concatenate([up[:1], up[:-1]])) * area))

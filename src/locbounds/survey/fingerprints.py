@@ -134,7 +134,7 @@ class Fingerprints:
             self, position_m=self.position_m[kept], point=point.reshape(-1), value=self.value[index], group=group
         )
 
-    def merged(self, cell_m: float) -> Fingerprints:
+    def merged(self, cell_m: float | int) -> Fingerprints:
         """Samples within one cell of a grid become samples of one point, at their mean position.
 
         Parameters

@@ -14,9 +14,7 @@ FOLDS = 10
 GAPS, EXTENTS = 2.0, 0.1  # a test point is outside if it is farther from the survey than both: largest gaps, extents
 
 
-def split(
-    survey: Fingerprints, labels: Mapping[str, Sequence[str]], test: str
-) -> tuple[Fingerprints, Fingerprints]:
+def split(survey: Fingerprints, labels: Mapping[str, Sequence[str]], test: str) -> tuple[Fingerprints, Fingerprints]:
     """Samples of the survey and samples held out.
 
     Parameters
@@ -73,7 +71,7 @@ def folds(survey: Fingerprints, how: str, *, seed: int = 0) -> Iterator[tuple[Fi
     if how == "points":
         walks = len(set(survey.group)) > 1
         unit = np.unique(np.array(survey.group), return_inverse=True)[1].reshape(-1) if walks else survey.point
-        fold = _deal(unit.max() + 1, rng)[unit]
+        fold = _deal(int(unit.max()) + 1, rng)[unit]
     else:
         fold = _sample_folds(survey, rng)
     for k in range(FOLDS):
@@ -111,7 +109,7 @@ def refuse_outside(survey: Fingerprints, test: Fingerprints) -> None:
     if away[k] > limit:
         at = ", ".join(f"{x:.4g}" for x in test.position_m[k])
         raise InputError(
-            f"the test point at ({at}) m is {away[k]:.3g} m from the nearest survey point; {int(np.sum(away > limit))} of "
-            f"{len(away)} test points lie more than {limit:.3g} m outside",
+            f"the test point at ({at}) m is {away[k]:.3g} m from the nearest survey point; {int(np.sum(away > limit))} "
+            f"of {len(away)} test points lie more than {limit:.3g} m outside",
             "Survey that area, or leave these points out; check that both are in the same coordinates",
         )

@@ -85,7 +85,7 @@ def interpolated(model: SurveyModel, *, like: DenseSurvey | None = None) -> Dens
     """
     from scipy.spatial import cKDTree
 
-    n, space = model.position_m.shape
+    n = model.points
     if n > MOST_POINTS:
         raise InputError(f"a Gaussian process on {n:,} points", f"Merge points (--merge M) to at most {MOST_POINTS:,}")
     if n < 8:

@@ -52,7 +52,7 @@ class DiscreteMmse(NamedTuple):
 
 
 def discrete_mmse(
-    model: SurveyModel, *, draws: int = DRAWS, seed: int = 0, scale: float = 1.0, most_points: int | None = None
+    model: SurveyModel, *, draws: int = DRAWS, seed: int = 0, scale: float | int = 1.0, most_points: int | None = None
 ) -> DiscreteMmse:
     """Draw fingerprints from the model and average the posterior variance of the position.
 
@@ -121,7 +121,10 @@ def discrete_mmse(
     at = np.full(n, np.nan)
     at[chosen] = error.sum(axis=-1).mean(axis=1)
     everything = np.concatenate([variance.sum(axis=-1, keepdims=True), variance], axis=-1)
-    mean, stderr = everything.mean(axis=(0, 1)), np.array([_stderr(v, most == n) for v in np.moveaxis(everything, -1, 0)])
+    mean, stderr = (
+        everything.mean(axis=(0, 1)),
+        np.array([_stderr(v, most == n) for v in np.moveaxis(everything, -1, 0)]),
+    )
     how = "points"
     if n <= PAIRS and model.silence != "censored":
         other = _between_points(scaled.whitened, place, draws, rng)
@@ -155,7 +158,9 @@ def _between_points(x: ndarray, place: ndarray, draws: int, rng: np.random.Gener
         log = z @ x.T - square / 2
         at = np.arange(len(a))
         top = log.max(axis=1)
-        ratio[start : start + step] = np.exp((log[at, a] + log[at, b]) / 2 - top) / np.exp(log - top[:, None]).sum(axis=1)
+        ratio[start : start + step] = np.exp((log[at, a] + log[at, b]) / 2 - top) / np.exp(log - top[:, None]).sum(
+            axis=1
+        )
     value = share * ratio[:, None] * scale
     return value.mean(axis=0), value.std(axis=0, ddof=1) / np.sqrt(draws)
 

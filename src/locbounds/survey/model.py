@@ -74,7 +74,7 @@ class SurveyModel:
         """Root mean square deviation of the RSS noise, dB; NaN without RSS."""
         return self.noise.level_db(self.units)
 
-    def at_noise(self, factor: float) -> SurveyModel:
+    def at_noise(self, factor: float | int) -> SurveyModel:
         """The same survey with all noise deviations multiplied."""
         return replace(self, noise=self.noise.scaled(factor))
 
@@ -101,8 +101,8 @@ class SurveyModel:
             return ()
         return (
             "the most similar fingerprints differ hardly more than the noise of the survey's own averages "
-            f"({self.samples / self.points:.1f} samples a point) makes them differ: the bound is lower than it would be "
-            "for exact averages (take more samples a point, or merge points)",
+            f"({self.samples / self.points:.1f} samples a point) makes them differ: the bound is lower than it would "
+            "be for exact averages (take more samples a point, or merge points)",
         )
 
     def as_read(self, value: Float[ndarray, "n columns"]) -> Float[ndarray, "n columns"]:
@@ -114,7 +114,7 @@ class SurveyModel:
 def survey_model(
     survey: Fingerprints,
     *,
-    noise_db: float | str = "auto",
+    noise_db: float | int | str = "auto",
     shape: str = "each",
     silence: str = "level",
     twins: bool = False,
@@ -144,6 +144,14 @@ def survey_model(
     ------
     InputError
         Too few points, nothing heard, no repeats for ``"auto"``, unknown options.
+
+    Examples
+    --------
+    >>> heard = np.array([[-40.0, -60], [-42, -61], [-50, -55], [-53, np.nan]])
+    >>> survey = Fingerprints.at(np.array([[0.0, 0], [0, 0], [3, 0], [3, 0]]), heard)
+    >>> model = survey_model(survey)
+    >>> model.mean.tolist(), round(model.noise_db, 2), model.level.tolist()
+    ([[-41.0, -60.5], [-51.5, -58.0]], 1.53, [-61.0, -61.0])
     """
     if silence not in SILENCE:
         raise InputError(f'silence is "{silence}"', f"Choose one of {', '.join(SILENCE)}")
@@ -172,7 +180,9 @@ def survey_model(
     lacking = ~np.isfinite(mean)
     if lacking.any():
         mean = _from_the_nearest(survey.position_m, mean)
-        notes.append(f"{int(lacking.sum())} ranges never measured at a point are taken from the nearest one that has it.")
+        notes.append(
+            f"{int(lacking.sum())} ranges never measured at a point are taken from the nearest one that has it."
+        )
     return SurveyModel(
         survey.names,
         survey.units,

@@ -80,9 +80,7 @@ def nearest_neighbours(id: str, *, neighbours: int = NEIGHBOURS) -> Estimator:
     if neighbours < 1:
         raise InputError(f"{neighbours} neighbours", "Give at least 1")
 
-    def estimate(
-        model: SurveyModel, value: Float[ndarray, "samples columns"]
-    ) -> Float[ndarray, "samples space"]:
+    def estimate(model: SurveyModel, value: Float[ndarray, "samples columns"]) -> Float[ndarray, "samples space"]:
         from sklearn.neighbors import KNeighborsRegressor
 
         unit = _unit(model)

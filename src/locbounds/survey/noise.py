@@ -43,7 +43,7 @@ class Noise:
             worst = float(np.min(self.deviation))
             raise InputError(f"a deviation of the noise is {worst:g}", "Give a positive noise level (--noise DB)")
 
-    def scaled(self, factor: float) -> Noise:
+    def scaled(self, factor: float | int) -> Noise:
         """The same noise, all deviations multiplied."""
         return replace(self, deviation=self.deviation * factor)
 

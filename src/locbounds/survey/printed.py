@@ -8,10 +8,10 @@ from locbounds.errors import InputError
 from locbounds.survey.assignment import confusion
 from locbounds.survey.model import SurveyModel
 
-ROWS = 1024
+ROWS = 256
 
 
-def printed_mse(model: SurveyModel, *, scale: float = 1.0, squared: bool = False) -> float:
+def printed_mse(model: SurveyModel, *, scale: float | int = 1.0, squared: bool = False, every: int = 1) -> float:
     """Equation (31) of the chapter, m^2.
 
     Parameters
@@ -22,6 +22,9 @@ def printed_mse(model: SurveyModel, *, scale: float = 1.0, squared: bool = False
         Noise level relative to the model's.
     squared
         Take sigma^2 where (32) prints it. The probability of error has sigma there; the two agree at 1 dB.
+
+    every
+        Of the average over the points, take every so many points only.
 
     Notes
     -----
@@ -41,14 +44,14 @@ def printed_mse(model: SurveyModel, *, scale: float = 1.0, squared: bool = False
     >>> round(printed_mse(survey_model(survey, noise_db=1.0)) * 3 / 2, 6)
     2.0
     """
-    x, place, n = model.whitened, model.position_m, model.points
+    x, place = model.whitened, model.position_m
     if squared:
         if model.noise.correlation is not None or np.ptp(model.noise.deviation) > 0:
             raise InputError("(32) is printed for one noise level", "Use the noise shape common")
         scale = scale**2 * float(model.noise.deviation[0])
-    total = 0.0
-    for start in range(0, n, ROWS):
-        rows = slice(start, start + ROWS)
+    total, chosen = 0.0, np.arange(0, model.points, every)
+    for start in range(0, len(chosen), ROWS):
+        rows = chosen[start : start + ROWS]
         d = np.sum(x[rows] ** 2, axis=1)[:, None] + np.sum(x**2, axis=1) - 2 * x[rows] @ x.T
         p = confusion(np.sqrt(np.maximum(d, 0.0)) / scale)
         apart = np.sqrt(np.sum(np.square(place[rows, None] - place), axis=-1))
@@ -57,4 +60,4 @@ def printed_mse(model: SurveyModel, *, scale: float = 1.0, squared: bool = False
         reached = np.take_along_axis(p, order, axis=1)
         reached = np.maximum.accumulate(reached[:, ::-1], axis=1)[:, ::-1]  # the largest P at this distance or beyond
         total += float(np.sum(reached[:, 1:] * np.diff(np.square(e), axis=1)))
-    return total / n
+    return total / len(chosen)

@@ -82,7 +82,11 @@ class SomePairs:
     def _part(self, c: Candidates) -> tuple[ndarray, ndarray, ndarray]:
         order = np.argsort(c.square, axis=1)
         column = np.take_along_axis(c.column, order, axis=1)
-        return column, self._apart_of(column), np.sqrt(np.take_along_axis(c.square, order, axis=1)) / np.float32(self._scale)
+        return (
+            column,
+            self._apart_of(column),
+            np.sqrt(np.take_along_axis(c.square, order, axis=1)) / np.float32(self._scale),
+        )
 
     def _apart_of(self, column: ndarray) -> ndarray:
         apart = np.empty(column.shape, np.float32)
@@ -122,16 +126,18 @@ class SomePairs:
             weight = np.take_along_axis(weight, at, axis=2)
             column = np.take_along_axis(c.column.reshape(apart.shape), at, axis=2)
             first = (slice(None), slice(None), slice(EACH))
-            picked.append(_Kept(weight[first].reshape(n, -1), column[first].reshape(n, -1), weight[..., EACH].max(axis=1)))
+            picked.append(
+                _Kept(weight[first].reshape(n, -1), column[first].reshape(n, -1), weight[..., EACH].max(axis=1))
+            )
         unseen = [np.square(r) * spread(d) for r, d in zip(self._reach, self._left_out, strict=True)]
-        left, right, upper = self._match(picked, np.max([u.max(axis=1) for u in unseen], axis=0), both_ways=2 * EACH * SEGMENTS)
+        left, right, upper = self._match(
+            picked, np.max([u.max(axis=1) for u in unseen], axis=0), both_ways=2 * EACH * SEGMENTS
+        )
         square = np.square(self._apart(left, right)) * spread(self._distance(left, right))
         value = float(square.sum() / n)
         return value, max(upper / n, value)
 
-    def _match(
-        self, picked: list[_Kept], unseen: ndarray, *, both_ways: int = 0
-    ) -> tuple[ndarray, ndarray, float]:
+    def _match(self, picked: list[_Kept], unseen: ndarray, *, both_ways: int = 0) -> tuple[ndarray, ndarray, float]:
         """Matched pairs, and an upper value of the sum of the weights of any matching.
 
         The prices of the auction cover the pairs that took part; raising the price of a point to the heaviest pair of

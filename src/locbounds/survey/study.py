@@ -24,6 +24,7 @@ LEVELS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 16.0)  # the same withou
 LARGE_LEVELS = (1.0, 2.0, 4.0)  # of a large survey, relative to its noise
 DRAWS = 20_000
 LARGE_DRAWS = 2_000  # of a survey with more points than all pairs are taken of
+PRINTED = 2_000  # points over which the chapter's formula is averaged, at most
 VISIBLE = 0.01  # of the extent: an error that a map can show
 NAMES = {
     "survey": "rigorous bound",
@@ -89,10 +90,10 @@ def study(
     labels: Mapping[str, Sequence[str]] | None = None,
     *,
     test: str | Fingerprints = "points",
-    noise_db: float | str = "auto",
+    noise_db: float | int | str = "auto",
     shape: str = "each",
     silence: str = "level",
-    merge_m: float | None = None,
+    merge_m: float | int | None = None,
     neighbours: int = NEIGHBOURS,
     twins: bool = False,
     map: bool = True,
@@ -173,7 +174,8 @@ def study(
     curve = []
     for factor in _levels(model, levels, large):
         announce(f"noise level {factor:.3g} of the survey's")
-        curve += _at_level(model, candidates, estimators, factor, large, seed)
+        known_bound, known_least = (bound, least) if factor == 1 else (None, None)
+        curve += _at_level(model, candidates, estimators, factor, large, seed, known_bound, known_least)
     announce("which access points matter")
     factor, seen = _visible(model, least, curve, large, seed)
     at_factor = bound if factor == 1 or not large else survey_bound(model, candidates=candidates, scale=factor)
@@ -208,8 +210,13 @@ def _at_own_level(model: SurveyModel, bound: SurveyBound, least: DiscreteMmse, l
     rows = [Row("survey", level, bound.rmse_m, 0.0, VALID)]
     rows += [Row(f"survey-{a}", level, float(np.sqrt(p.mse_m2)), 0.0, VALID) for a, p in bound.axes.items()]
     rows += [Row("survey-length", level, float(np.sqrt(bound.length.mse_m2)), 0.0, VALID)]
-    rows += [Row("survey-printed", level, float(np.sqrt(printed_mse(model))), 0.0, NOT_A_BOUND)]
+    rows += [_printed(model, 1.0)]
     return [*rows, Row("mmse", level, least.rmse_m, least.rmse_stderr_m, ESTIMATE)]
+
+
+def _printed(model: SurveyModel, factor: float) -> Row:
+    value = printed_mse(model, scale=factor, every=-(-model.points // PRINTED))
+    return Row("survey-printed", model.noise_db * factor, float(np.sqrt(value)), 0.0, NOT_A_BOUND, factor)
 
 
 def _on_the_map(dense: SurveyModel, seed: int) -> list[Row]:
@@ -255,21 +262,19 @@ def _levels(model: SurveyModel, levels: Sequence[float] | None, large: bool) -> 
     return [db / model.noise_db for db in LEVELS_DB] if np.isfinite(model.noise_db) else list(LEVELS)
 
 
-def _at_level(model, candidates, estimators, factor: float, large: bool, seed: int) -> list[Row]:
+def _at_level(model, candidates, estimators, factor: float, large: bool, seed: int, bound, least) -> list[Row]:
     level = model.noise_db * factor
-    bound = survey_bound(model, candidates=candidates, scale=factor)
-    least = discrete_mmse(model, draws=LARGE_DRAWS if large else DRAWS // 2, seed=seed, scale=factor)
+    bound = bound or survey_bound(model, candidates=candidates, scale=factor)
+    least = least or discrete_mmse(model, draws=LARGE_DRAWS if large else DRAWS // 2, seed=seed, scale=factor)
     rows = [
         Row("survey", level, bound.rmse_m, 0.0, VALID, factor),
-        Row("survey-printed", level, float(np.sqrt(printed_mse(model, scale=factor))), 0.0, NOT_A_BOUND, factor),
+        _printed(model, factor),
         Row("mmse", level, least.rmse_m, least.rmse_stderr_m, ESTIMATE, factor),
     ]
     for id, estimate in estimators.items():
         rmse, error = simulated(estimate, model, draws=LARGE_DRAWS, seed=seed, scale=factor)
         rows.append(Row(f"{id}-model", level, rmse, error, ESTIMATE, factor))
     return rows
-
-
 
 
 def curve_rows(name: str, found: SurveyStudy) -> list[tuple]:
