@@ -139,7 +139,8 @@ def survey(
         )
         return
     print_table(
-        f"Position RMSE: {found.model.points:,} points, {found.model.samples:,} samples, {len(found.model.names)} columns",
+        f"Position RMSE: {found.model.points:,} points, {found.model.samples:,} samples, "
+        f"{len(found.model.names)} columns",
         ("method", "what", "RMSE", "valid"),
         [(r.method, about.name_of(r.method), about.in_metres(r), r.valid) for r in found.rows],
     )

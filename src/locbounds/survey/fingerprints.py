@@ -102,7 +102,7 @@ class Fingerprints:
     def checked(self) -> Fingerprints:
         """Without columns that say nothing; an InputError if too little is left for a survey."""
         heard = self.heard
-        silent = ~heard.any(axis=0)
+        silent = np.asarray(~heard.any(axis=0))
         if silent.all():
             raise InputError("no access point is heard anywhere", "Check the columns, and the code for not heard")
         spread = np.where(heard, self.value, np.nan)
@@ -115,7 +115,7 @@ class Fingerprints:
         notes = list(self.notes)
         for which, what in ((silent, "never heard"), (constant, "with one value everywhere")):
             if which.any():
-                found = [name for name, it in zip(self.names, which, strict=True) if it]
+                found = [name for name, it in zip(self.names, which.tolist(), strict=True) if it]
                 notes.append(f"Left out, {what}: {_list(found)}.")
         return replace(self.columns(~(silent | constant)), notes=tuple(notes))
 

@@ -99,9 +99,9 @@ def _sample_folds(survey: Fingerprints, rng: np.random.Generator) -> ndarray:
 
 def refuse_outside(survey: Fingerprints, test: Fingerprints) -> None:
     """Raise an InputError if a test point lies outside the survey."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
-    tree = cKDTree(survey.position_m)
+    tree = KDTree(survey.position_m)
     gap = float(tree.query(survey.position_m, k=2)[0][:, 1].max())
     limit = max(GAPS * gap, EXTENTS * float(np.linalg.norm(np.ptp(survey.position_m, axis=0))))
     away = tree.query(test.position_m)[0]

@@ -13,6 +13,7 @@ from locbounds.survey.model import SurveyModel
 
 MOST_POINTS = 1_000  # of a survey: the cost grows with the cube
 MOST_DENSE = 3_000  # points of the dense grid
+FIXED: dict[str, Any] = {"optimizer": None}  # the kernel stays as it is
 FINER = 3  # spacing of the dense grid: this part of the median distance to the nearest survey point
 
 
@@ -83,7 +84,7 @@ def interpolated(model: SurveyModel, *, like: DenseSurvey | None = None) -> Dens
     >>> dense.model.points > 5 * len(x), bool(dense.variance.max() < 0.5)
     (True, True)
     """
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     n = model.points
     if n > MOST_POINTS:
@@ -91,7 +92,7 @@ def interpolated(model: SurveyModel, *, like: DenseSurvey | None = None) -> Dens
     if n < 8:
         raise InputError(f"a map from {n} points", "Survey at least 8 points")
     place = model.position_m
-    tree = cKDTree(place)
+    tree = KDTree(place)
     spacing = float(np.median(tree.query(place, k=2)[0][:, 1]))
     grid, step = _grid(place, tree, spacing)
     mean, deviation = model.mean.mean(axis=0), model.mean.std(axis=0)
@@ -113,7 +114,7 @@ def interpolated(model: SurveyModel, *, like: DenseSurvey | None = None) -> Dens
     return DenseSurvey(dense_model, std**2, deviation**2, process.kernel_)
 
 
-def _fit(place: ndarray, columns: ndarray, spacing: float, known: Any):
+def _fit(place: ndarray, columns: ndarray, spacing: float, known: Any) -> Any:
     import warnings
 
     from sklearn.exceptions import ConvergenceWarning
@@ -121,7 +122,7 @@ def _fit(place: ndarray, columns: ndarray, spacing: float, known: Any):
     from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
     if known is not None:
-        return GaussianProcessRegressor(known, optimizer=None).fit(place, columns)
+        return GaussianProcessRegressor(known, **FIXED).fit(place, columns)
     reach = float(np.linalg.norm(np.ptp(place, axis=0)))
     kernel = ConstantKernel(1.0, (0.05, 20.0)) * Matern(3 * spacing, (0.3 * spacing, 3 * reach), nu=1.5)
     kernel = kernel + WhiteKernel(0.1, (1e-6, 2.0))

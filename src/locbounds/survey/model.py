@@ -213,12 +213,12 @@ def _deviation_of_differences(survey: Fingerprints, given: float | None) -> ndar
 
 
 def _from_the_nearest(place: ndarray, mean: ndarray) -> ndarray:
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     filled = mean.copy()
     for k in np.flatnonzero(~np.isfinite(mean).all(axis=0)):
         has = np.isfinite(mean[:, k])
-        _, nearest = cKDTree(place[has]).query(place[~has])
+        _, nearest = KDTree(place[has]).query(place[~has])
         filled[~has, k] = mean[has, k][nearest]
     return filled
 
