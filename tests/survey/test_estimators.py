@@ -82,8 +82,8 @@ def test_every_removal_raises_the_bound_and_kept_matchings_say_less():
         assert full < value <= anew[name] * (1 + 1e-9)
 
 
-def test_the_map_finds_positions_between_the_points():
-    """A smooth field and little noise: the map's estimator is better than the nearest neighbours, pair by pair."""
+def test_the_map_is_right_between_the_points_and_locates_by_its_posterior_mean():
+    """A smooth field: a fifth of the error of taking the nearest point's fingerprint, or less."""
     x = np.stack(np.meshgrid(np.arange(0, 12, 2.0), np.arange(0, 9, 2.0)), -1).reshape(-1, 2)
     beacons = np.array([[-3.0, -3], [15, -3], [6, 14], [-3, 12]])
 
@@ -92,14 +92,15 @@ def test_the_map_finds_positions_between_the_points():
 
     model = lb.survey_model(Fingerprints.at(x, field(x) - 20), noise_db=0.5)
     dense = interpolated(model)
-    between = RNG.random((200, 2)) * [10, 8]
-    z = field(between) - 20 + 0.5 * RNG.normal(size=(200, 4))
-    map_error, knn_error = (
-        np.sum((estimate - between) ** 2, axis=1)
-        for estimate in (dense.locate(z), nearest_neighbours("wknn", neighbours=3)(model, z))
-    )
-    gain = knn_error - map_error
-    assert gain.mean() > 3 * gain.std(ddof=1) / np.sqrt(len(gain))
+    grid = dense.model.position_m
+    nearest = field(x[cdist(grid, x).argmin(axis=1)])
+    wrong, plain = (np.sqrt(np.mean((z - field(grid)) ** 2)) for z in (dense.model.mean + 20, nearest))
+    assert wrong < 0.2 * plain
+    certain = dense._replace(variance=0 * dense.variance)  # then it locates by the posterior mean of its model
+    loud = dense.model.at_noise(4.0)
+    best, stderr = simulated(lambda _, z: certain._replace(model=loud).locate(z), loud, draws=6_000)
+    least = lb.discrete_mmse(loud, draws=6_000)
+    assert abs(best - least.rmse_m) < 4 * np.hypot(stderr, least.rmse_stderr_m)
     with pytest.raises(lb.InputError, match="at least 8 points"):
         interpolated(lb.survey_model(Fingerprints.at(x[:5], field(x[:5]) - 20), noise_db=0.5))
 
