@@ -64,8 +64,8 @@ def curve(sets: Mapping[str, tuple[Sequence[Row], Sequence[Row]]]) -> "Figure":
         axes.set(yscale="log", xlabel="noise in dB" if in_db else "noise relative to this survey's")
         axes.set_title(title, loc="left", fontsize="medium")
         axes.grid(alpha=0.3, which="both")
-    largest = max(row.rmse_m for rows, own in sets.values() for row in (*rows, *own))
-    panels[0].set_ylim(SMALLEST_M, 1.5 * max(largest, 2 * SMALLEST_M))
+    drawn = [r.rmse_m for rows, own in sets.values() for r in (*rows, *own) if r.rmse_m >= SMALLEST_M]
+    panels[0].set_ylim(max(SMALLEST_M, min(drawn) / 2), 1.5 * max(drawn)) if drawn else None
     for axes in panels[::across]:
         axes.set_ylabel("position RMSE in m")
     handles: dict = {}
@@ -113,7 +113,7 @@ def where_it_fails(found: SurveyStudy, *, title: str = "") -> "Figure":
         axes.set(xlabel="x in m", ylabel="y in m", aspect="equal")
         axes.grid(alpha=0.2)
     if title:
-        figure.suptitle(title, x=0.02, ha="left")
+        figure.suptitle(title)
     return figure
 
 
