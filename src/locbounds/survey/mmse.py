@@ -79,7 +79,7 @@ def discrete_mmse(
     -----
     Two estimates are made, and the one with the smaller relative standard error is returned. Draws at the points see
     confusions as often as they happen: too seldom at low noise. Draws between two points, a pair chosen by how much
-    its confusion would cost, see nothing else: with f_i the density of the fingerprint at point i,
+    its confusion would cost, see nothing else: with f_i the density of the fingerprint at point i::
 
         E[error^2] = sum over i < j of |theta_i - theta_j|^2 / N * int f_i f_j / (sum over k of f_k) dz
 
