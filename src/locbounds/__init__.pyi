@@ -7,6 +7,7 @@ from .filters import Estimates, FactorisedImmEkf, ImmEkf, ImmKf, OracleEkf
 from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
+from .io.surveys import read_survey
 from .measurement import BySight, Range
 from .model import AdditiveChannel, DensityChannel, DensityMotion, JumpMarkov, jump_markov
 from .motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
@@ -18,6 +19,7 @@ from .result import Result, tightest
 from .scenario import Link, Scenario
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
+from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
 
 __version__: str
@@ -35,6 +37,7 @@ __all__ = [
     "DwellSight",
     "Estimates",
     "FactorisedImmEkf",
+    "Fingerprints",
     "Gaussian",
     "GaussianMixture",
     "GaussianPrior",
@@ -59,6 +62,7 @@ __all__ = [
     "Times",
     "bcrb",
     "bcrb_algorithm1",
+    "discrete_mmse",
     "enumer",
     "evaluate",
     "explain",
@@ -71,7 +75,10 @@ __all__ = [
     "plot",
     "quantile",
     "read_log",
+    "read_survey",
     "save",
     "simulate",
+    "survey_bound",
+    "survey_model",
     "tightest",
 ]

@@ -7,12 +7,21 @@ import importlib
 from typing import Any, NamedTuple
 
 from locbounds.errors import InputError
-from locbounds.scenario import Scenario
-from locbounds.verdict import KNOWN_SIGHT, LOS_AND_NLOS, SEPARABLE, SMOOTH_NOISE, Assumption, Verdict, judge
+from locbounds.verdict import (
+    KNOWN_SIGHT,
+    LOS_AND_NLOS,
+    SEPARABLE,
+    SMOOTH_NOISE,
+    SURVEYED,
+    Assumption,
+    Verdict,
+    judge,
+)
 
 RANGES = frozenset({"ranges"})
 RANGES_AND_SIGHT = frozenset({"ranges", "sight"})
 LOS_RANGES_AND_SIGHT = frozenset({"los-ranges", "sight"})
+FINGERPRINT = frozenset({"fingerprint"})
 
 
 class Method(NamedTuple):
@@ -35,9 +44,11 @@ class Method(NamedTuple):
     references
         Citation keys of docs/references.bib.
     assumptions
-        Predicates on a scenario.
+        Predicates on what it speaks of.
     conditions
         Under which condition it is valid at all.
+    subject
+        What it speaks of: a ``"scenario"`` or a ``"survey"``.
     """
 
     id: str
@@ -51,10 +62,11 @@ class Method(NamedTuple):
     references: tuple[str, ...]
     assumptions: tuple[Assumption, ...] = ()
     conditions: tuple[str, ...] = ()
+    subject: str = "scenario"
 
-    def verdict(self, scenario: Scenario, conditions: tuple[str, ...] = ()) -> Verdict:
-        """Whether it applies to a scenario."""
-        return judge(self.assumptions, scenario, grounds=self.grounds, conditions=self.conditions + conditions)
+    def verdict(self, subject: Any, conditions: tuple[str, ...] = ()) -> Verdict:
+        """Whether it applies to a scenario (or to a survey model)."""
+        return judge(self.assumptions, subject, grounds=self.grounds, conditions=self.conditions + conditions)
 
 
 METHODS: dict[str, Method] = {
@@ -113,6 +125,25 @@ METHODS: dict[str, Method] = {
             ("qi2006",),
             (SMOOTH_NOISE, LOS_AND_NLOS, SEPARABLE),
             ("estimators that discard NLOS ranges, or an NLOS excess about which nothing is known",),
+        ),
+        Method(
+            "survey",
+            "Survey bound",
+            "bound",
+            "Discrete Ziv-Zakai bound of a fingerprint survey: no estimator that sees one fingerprint has a smaller "
+            "mean square error over the surveyed points.",
+            FINGERPRINT,
+            "locbounds.survey:survey_bound",
+            (),
+            "Goes to zero with the noise, while the error between surveyed points does not; a survey of few noisy "
+            "samples makes points look more different than they are.",
+            ("mcguire2009", "bell1997"),
+            (SURVEYED,),
+            (
+                "a device at one of the surveyed points, all equally likely",
+                "Gaussian noise, the same everywhere, around the mean fingerprints of the survey",
+            ),
+            "survey",
         ),
         Method(
             "imm-ekf",
@@ -178,6 +209,15 @@ def method(id: str, kind: str | None = None) -> Method:
     near = difflib.get_close_matches(id, [m.id for m in known], n=1, cutoff=0.4)
     hint = f"Did you mean {near[0]}? " if near else ""
     raise InputError(f"unknown {kind or 'method'} {id!r}", f"{hint}Known: {', '.join(m.id for m in known)}")
+
+
+def bounds_of(subject: str) -> list[Method]:
+    """The bounds that speak of a scenario, or of a survey.
+
+    >>> [m.id for m in bounds_of("survey")]
+    ['survey']
+    """
+    return [m for m in METHODS.values() if m.kind == "bound" and m.subject == subject]
 
 
 def load(entry: Method) -> Any:

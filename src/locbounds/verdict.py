@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,11 +31,11 @@ class Assumption(NamedTuple):
     text
         What is assumed, in words.
     violated
-        Predicate: the reason why a scenario violates it, or None.
+        Predicate: the reason why a scenario (or a survey) violates it, or None.
     """
 
     text: str
-    violated: Callable[[Scenario], str | None]
+    violated: Callable[[Any], str | None]
 
 
 class Verdict(NamedTuple):
@@ -61,9 +61,9 @@ class Verdict(NamedTuple):
 
 
 def judge(
-    assumptions: tuple[Assumption, ...], scenario: Scenario, *, grounds: tuple[str, ...], conditions: tuple[str, ...]
+    assumptions: tuple[Assumption, ...], subject: Any, *, grounds: tuple[str, ...], conditions: tuple[str, ...]
 ) -> Verdict:
-    """Verdict of a method with these assumptions for a scenario.
+    """Verdict of a method with these assumptions for a scenario, or for anything else that they are predicates on.
 
     Parameters
     ----------
@@ -74,11 +74,13 @@ def judge(
     conditions
         What the number depends on beyond the model (for example one measured track).
     """
-    violations = tuple(reason for a in assumptions if (reason := a.violated(scenario)) is not None)
+    violations = tuple(reason for a in assumptions if (reason := a.violated(subject)) is not None)
     if violations:
         return Verdict(Status.REFUSED, violations)
     status = Status.CONDITIONAL if conditions else Status.VALID
-    return Verdict(status, conditions or grounds, dangers(scenario))
+    return Verdict(
+        status, conditions or grounds, dangers(subject) if isinstance(subject, Scenario) else subject.dangers()
+    )
 
 
 def regular_noise(scenario: Scenario) -> str | None:
@@ -115,9 +117,17 @@ def not_separable(scenario: Scenario) -> str | None:
 
 
 SEPARABLE = Assumption("motion without modes, one chain per link, measurements that do not depend on it", not_separable)
+
+
+def two_points(survey: Any) -> str | None:
+    """Why a survey tells nothing about accuracy, or None."""
+    return None if survey.points > 1 else f"the survey has {survey.points} point"
+
+
 SMOOTH_NOISE = Assumption("every noise has a finite Fisher information about a shift", regular_noise)
 KNOWN_SIGHT = Assumption("the sight of every link is known at every step", all_sights_known)
 LOS_AND_NLOS = Assumption("every link is either LOS or NLOS", two_modes)
+SURVEYED = Assumption("at least two surveyed points", two_points)
 
 
 @double_precision

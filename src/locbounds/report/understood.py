@@ -7,7 +7,7 @@ import numpy as np
 from locbounds.axes import LOS, NLOS
 from locbounds.motion import ConstantAcceleration, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
 from locbounds.noise import Gaussian, Noise
-from locbounds.registry import METHODS
+from locbounds.registry import bounds_of
 from locbounds.scenario import Link, Scenario
 from locbounds.sight import DwellSight, KnownSight, MarkovSight, Sight
 from locbounds.verdict import dangers
@@ -39,7 +39,7 @@ def understood(scenario: Scenario) -> dict[str, Any]:
     >>> seen["links"][0]["NLOS error"]
     'mean 513 m, deviation 435.639 m'
     """
-    verdicts = {m.id: m.verdict(scenario) for m in METHODS.values() if m.kind == "bound"}
+    verdicts = {m.id: m.verdict(scenario) for m in bounds_of("scenario")}
     return {
         "title": scenario.title,
         "model": {"time": _time(scenario), "motion": _motion(scenario), "prior": _prior(scenario)},
