@@ -9,7 +9,22 @@ from .io.logs import read_log
 from .io.scenario_file import load, save
 from .measurement import Range
 from .motion import ConstantVelocity
-from .noise import Gaussian, GaussianMixture
+from .noise import (
+    Exponential,
+    ExponentiallyModifiedGaussian,
+    FromLogDensity,
+    FromNumPyro,
+    Gamma,
+    Gaussian,
+    GaussianMixture,
+    Laplace,
+    LogNormal,
+    Mixture,
+    Singularity,
+    StudentT,
+    TruncatedGaussian,
+    Uniform,
+)
 from .priors import GaussianPrior
 from .registry import explain
 from .report import plot
@@ -26,7 +41,12 @@ __all__ = [
     "Draws",
     "DwellSight",
     "Estimates",
+    "Exponential",
+    "ExponentiallyModifiedGaussian",
     "FactorisedImmEkf",
+    "FromLogDensity",
+    "FromNumPyro",
+    "Gamma",
     "Gaussian",
     "GaussianMixture",
     "GaussianPrior",
@@ -34,9 +54,12 @@ __all__ = [
     "ImmKf",
     "InputError",
     "KnownSight",
+    "Laplace",
     "Link",
     "LocboundsError",
+    "LogNormal",
     "MarkovSight",
+    "Mixture",
     "OracleEkf",
     "PrecisionError",
     "Prior",
@@ -44,7 +67,11 @@ __all__ = [
     "RefusedError",
     "Result",
     "Scenario",
+    "Singularity",
+    "StudentT",
     "Times",
+    "TruncatedGaussian",
+    "Uniform",
     "bcrb",
     "bcrb_algorithm1",
     "enumer",
