@@ -10,6 +10,7 @@ from .io.scenario_file import load, save
 from .measurement import Range
 from .motion import ConstantVelocity
 from .noise import (
+    Epoch,
     Exponential,
     ExponentiallyModifiedGaussian,
     FromLogDensity,
@@ -24,6 +25,8 @@ from .noise import (
     StudentT,
     TruncatedGaussian,
     Uniform,
+    bhattacharyya,
+    minimum_error,
 )
 from .priors import GaussianPrior
 from .registry import explain
@@ -40,6 +43,7 @@ __all__ = [
     "ConstantVelocity",
     "Draws",
     "DwellSight",
+    "Epoch",
     "Estimates",
     "Exponential",
     "ExponentiallyModifiedGaussian",
@@ -74,6 +78,7 @@ __all__ = [
     "Uniform",
     "bcrb",
     "bcrb_algorithm1",
+    "bhattacharyya",
     "enumer",
     "evaluate",
     "explain",
@@ -81,6 +86,7 @@ __all__ = [
     "known_sight",
     "load",
     "los_only",
+    "minimum_error",
     "papers",
     "plot",
     "quantile",

@@ -2,6 +2,7 @@
 
 from locbounds.noise.base import Noise
 from locbounds.noise.convolution import Convolution
+from locbounds.noise.epoch import Epoch
 from locbounds.noise.exponential import Exponential
 from locbounds.noise.exponentially_modified import ExponentiallyModifiedGaussian
 from locbounds.noise.from_log_density import FromLogDensity, FromNumPyro
@@ -12,6 +13,7 @@ from locbounds.noise.laplace import Laplace
 from locbounds.noise.log_normal import LogNormal
 from locbounds.noise.mixture import Mixture
 from locbounds.noise.regularity import Regularity
+from locbounds.noise.shifted_copies import bhattacharyya, minimum_error
 from locbounds.noise.singularity import Finding, Singularity
 from locbounds.noise.student_t import StudentT
 from locbounds.noise.sum_of_two import Sum, TruncatedGaussianSum, UniformSum
@@ -20,6 +22,7 @@ from locbounds.noise.uniform import Uniform
 
 __all__ = [
     "Convolution",
+    "Epoch",
     "Exponential",
     "ExponentiallyModifiedGaussian",
     "Finding",
@@ -40,4 +43,6 @@ __all__ = [
     "TruncatedGaussianSum",
     "Uniform",
     "UniformSum",
+    "bhattacharyya",
+    "minimum_error",
 ]
