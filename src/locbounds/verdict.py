@@ -20,6 +20,7 @@ class Status(StrEnum):
 
     VALID = "valid"
     CONDITIONAL = "valid under"
+    UNDECIDED = "undecided"
     REFUSED = "refused"
 
 
@@ -32,10 +33,13 @@ class Assumption(NamedTuple):
         What is assumed, in words.
     violated
         Predicate: the reason why a scenario (or a survey) violates it, or None.
+    doubtful
+        Predicate: the reason why it cannot be decided whether it is violated, or None.
     """
 
     text: str
     violated: Callable[[Any], str | None]
+    doubtful: Callable[[Any], str | None] = lambda subject: None
 
 
 class Verdict(NamedTuple):
@@ -44,7 +48,7 @@ class Verdict(NamedTuple):
     Attributes
     ----------
     status
-        Valid, valid under conditions, or refused.
+        Valid, valid under conditions, undecided (a number to look at, never one to quote), or refused.
     reasons
         One sentence each: grounds, conditions or violations.
     warnings
@@ -68,7 +72,7 @@ def judge(
     Parameters
     ----------
     assumptions
-        Checked in turn; a violation refuses.
+        Checked in turn; a violation refuses, a doubt leaves the verdict undecided.
     grounds
         Why the bound holds when nothing is violated.
     conditions
@@ -77,20 +81,42 @@ def judge(
     violations = tuple(reason for a in assumptions if (reason := a.violated(subject)) is not None)
     if violations:
         return Verdict(Status.REFUSED, violations)
+    warnings = dangers(subject) if isinstance(subject, Scenario) else subject.dangers()
+    doubts = tuple(doubt for a in assumptions if (doubt := a.doubtful(subject)) is not None)
+    if doubts:
+        return Verdict(Status.UNDECIDED, doubts + conditions, warnings)
     status = Status.CONDITIONAL if conditions else Status.VALID
-    return Verdict(
-        status, conditions or grounds, dangers(subject) if isinstance(subject, Scenario) else subject.dangers()
-    )
+    return Verdict(status, conditions or grounds, warnings)
 
 
 def regular_noise(scenario: Scenario) -> str | None:
     """Why the Fisher information of some noise does not exist, or None."""
     for link in scenario.links:
-        for noise in link.noises:
+        for mode, noise in enumerate(link.noises):
             regularity = noise.regularity()
-            if not regularity.finite:
-                return f"the noise of anchor {link.name} has no finite Fisher information: {regularity.reason}"
+            if regularity.finite is False:
+                return (
+                    f"the {_sight_name(link.noises, mode)}noise of anchor {link.name} has no finite Fisher "
+                    f"information: {regularity.reason}"
+                )
     return None
+
+
+def undecided_noise(scenario: Scenario) -> str | None:
+    """Why it is not known whether the Fisher information of some noise exists, or None."""
+    for link in scenario.links:
+        for mode, noise in enumerate(link.noises):
+            regularity = noise.regularity()
+            if regularity.finite is None:
+                return (
+                    f"whether the {_sight_name(link.noises, mode)}noise of anchor {link.name} has a finite Fisher "
+                    f"information is not known: {regularity.reason}"
+                )
+    return None
+
+
+def _sight_name(noises: tuple, mode: int) -> str:
+    return f"{('LOS', 'NLOS')[mode]} " if len(noises) == 2 else ""
 
 
 def all_sights_known(scenario: Scenario) -> str | None:
@@ -116,15 +142,13 @@ def not_separable(scenario: Scenario) -> str | None:
     return None if why is None else f"{why}: bcrb takes that, this does not"
 
 
-SEPARABLE = Assumption("motion without modes, one chain per link, measurements that do not depend on it", not_separable)
-
-
 def two_points(survey: Any) -> str | None:
     """Why a survey tells nothing about accuracy, or None."""
     return None if survey.points > 1 else f"the survey has {survey.points} point"
 
 
-SMOOTH_NOISE = Assumption("every noise has a finite Fisher information about a shift", regular_noise)
+SEPARABLE = Assumption("motion without modes, one chain per link, measurements that do not depend on it", not_separable)
+SMOOTH_NOISE = Assumption("every noise has a finite Fisher information about a shift", regular_noise, undecided_noise)
 KNOWN_SIGHT = Assumption("the sight of every link is known at every step", all_sights_known)
 LOS_AND_NLOS = Assumption("every link is either LOS or NLOS", two_modes)
 SURVEYED = Assumption("at least two surveyed points", two_points)
