@@ -134,10 +134,3 @@ def directions(
     """Gradients of every link's measurement with respect to position."""
     x = expectation.positions(scenario, key, paths)
     return jnp.stack([jax.vmap(jax.vmap(jax.grad(link.measurement)))(x) for link in scenario.links])
-
-
-def windows(u: Float[Array, "*n steps space"], size: int) -> Float[Array, "*n steps window space"]:
-    """For every step the last ``size`` entries, newest first; zero before the first step."""
-    steps = u.shape[-2]
-    padded = jnp.concatenate([jnp.zeros((*u.shape[:-2], size - 1, u.shape[-1])), u], axis=-2)
-    return padded[..., np.arange(steps)[:, None] + size - 1 - np.arange(size), :]
