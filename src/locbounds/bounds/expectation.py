@@ -15,7 +15,7 @@ import numpy as np
 from locbounds.axes import Array, Float
 from locbounds.errors import InputError
 from locbounds.precision import float64, traced
-from locbounds.scenario import Scenario
+from locbounds.scenario import Link, Scenario, alike
 from locbounds.simulation import draw_states
 
 
@@ -133,4 +133,9 @@ def directions(
 ) -> Float[Array, "links paths steps space"]:
     """Gradients of every link's measurement with respect to position."""
     x = expectation.positions(scenario, key, paths)
-    return jnp.stack([jax.vmap(jax.vmap(jax.grad(link.measurement)))(x) for link in scenario.links])
+
+    def of_link(link: Link) -> Array:
+        return jax.vmap(jax.vmap(jax.grad(link.measurement)))(x)
+
+    order, parts = zip(*((index, jax.vmap(of_link)(links)) for index, links in alike(scenario.links)), strict=True)
+    return jnp.concatenate(parts)[np.argsort(np.concatenate(order))]
