@@ -194,6 +194,32 @@ METHODS: dict[str, Method] = {
 }
 
 
+TOPICS: dict[str, str] = {
+    "regularity": """Regularity (regularity), when a Cramér-Rao bound exists
+All Cramér-Rao bounds need a noise whose Fisher information about a shift, E[score^2], is finite. That is so exactly
+where the root of the density has a square integrable derivative. Near a place x0, with t the distance from it:
+
+jump     p is not continuous (uniform, exponential, cut laws)             infinite
+edge     p ~ t^a at an end of the support, or at a zero inside            finite only for a > 1
+pole     p ~ t^a with a < 0                                               infinite
+cusp     p(x0) > 0 and p changes like t^b                                 finite only for b > 1/2
+kink     p(x0) > 0 and its slope jumps (Laplace)                          finite, but only as E[score^2]
+
+A sum of independent noises has no more information than each of them, so that any excess on top of Gaussian noise is
+regular. Exponents of a sum follow from those of its parts, a + b + 1: the sum of two cut laws (jumps, a = 0) vanishes
+linearly at its ends, and has no finite information either.
+
+Where the information is infinite the bound is zero, and a Monte Carlo value grows with the logarithm of the number of
+draws: bounds are refused, and the verdict names place and exponent. Weiss-Weinstein and Ziv-Zakai bounds apply.
+A law given as a function is examined: regular, irregular, or undecided. An undecided bound may be computed, but is
+never called valid nor compared with; declare the singularities of the density to decide it.
+
+see      locbounds check scenario.toml, which prints the verdict for every bound
+cite     hajek1972, ibragimov1981, stam1959, weiss1985""",
+}
+"""What ``explain`` tells beside the methods."""
+
+
 def method(id: str, kind: str | None = None) -> Method:
     """The entry of an id, or an InputError with the nearest known id.
 
@@ -254,7 +280,7 @@ def explain(id: str) -> str:
     Parameters
     ----------
     id
-        Id of a method, for example ``bcrb``.
+        Id of a method, for example ``bcrb``, or the topic ``regularity``.
 
     Raises
     ------
@@ -266,6 +292,8 @@ def explain(id: str) -> str:
     >>> print(explain("bcrb").splitlines()[0])
     BCRB (bcrb), a bound
     """
+    if id in TOPICS:
+        return TOPICS[id]
     entry = describe(method(id))
     lines = [f"{entry['name']} ({entry['id']}), a {entry['kind']}", entry["summary"], ""]
     lines += [f"sees     {', '.join(entry['sees'])}", *(f"assumes  {text}" for text in entry["assumes"])]

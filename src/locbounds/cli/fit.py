@@ -105,7 +105,11 @@ def fit(
         [tuple(round(x, 3) if isinstance(x, float) else x for x in row) for row in lags],
     )
     for name, table in laws.items():
-        print_table(f"Laws of the error, {name}", HEADER[1:], [row[1:] for row in table])
+        print_table(
+            f"Laws of the error, {name}: mean log density (1/m) of held-out errors",
+            HEADER[1:],
+            [row[1:] for row in table],
+        )
     for note in notes:
         typer.echo(note)
     typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")

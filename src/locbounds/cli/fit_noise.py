@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from locbounds.fit import FittedScenario, LawComparison, RangeLog
+    from locbounds.fit import LawComparison, RangeLog
 
 HEADER = (
     "errors of",
     "law",
-    "held-out log density",
-    "behind the best",
+    "held-out",
+    "behind best",
     "+-",
     "AIC",
-    "KS distance",
+    "KS",
     "bound",
     "numbers",
     "note",
@@ -86,8 +86,8 @@ def _short(value: Any) -> str:
     return text if values.size == 1 else f"[{text}]"
 
 
-def with_best_laws(fitted: "FittedScenario", laws: dict) -> tuple[Any, dict, tuple]:
-    """Scenario, comments and notes: with labels the winners replace the Gaussian laws of every link."""
+def with_best_laws(fitted: Any, laws: dict) -> tuple[Any, dict, tuple]:
+    """Scenario, comments and notes of a fitted scenario: with labels the winners replace the laws of every link."""
     notes = tuple(fitted.notes)
     if not laws:
         return fitted.scenario, fitted.comments, notes
@@ -107,7 +107,7 @@ def with_best_laws(fitted: "FittedScenario", laws: dict) -> tuple[Any, dict, tup
         path: text for path, text in fitted.comments.items() if not path.endswith((".los", ".nlos", ".outlier"))
     }
     comments |= {
-        f"links.{key}": f"best of {len(laws[name])} laws by held-out likelihood, {best[name].fit.errors} labelled errors"
+        f"links.{key}": f"best of {len(laws[name])} laws by held-out likelihood, {best[name].fit.errors} errors"
         for key, name in (("los", "LOS"), ("nlos", "NLOS"))
     }
     return fitted.scenario.replace(links=links), comments, notes

@@ -35,7 +35,10 @@ from locbounds.precision import double_precision
 
 FEWEST = 20
 BOX = 12.0  # limits of the logarithms of scales, in units of the errors' own spread
-DEGREES = np.log([0.5, 200.0])  # a Student t law with more degrees of freedom is Gaussian for all purposes
+DEGREES = (
+    float(np.log(0.5)),
+    float(np.log(200.0)),
+)  # a Student t law with more degrees of freedom is Gaussian for all purposes
 
 
 class LawFit(NamedTuple):
@@ -189,21 +192,21 @@ def _starts(family: str, u: ndarray) -> tuple[list[ndarray], list[tuple[float, f
     """Where the search starts, and its box, for standardised errors."""
     free, scale = (-BOX, BOX), (-BOX, BOX)
     if family == "student-t":
-        return [np.array([0.0, np.log(0.7), np.log(4.0)])], [free, scale, tuple(DEGREES)]
+        return [np.array([0.0, np.log(0.7), np.log(4.0)])], [free, scale, DEGREES]
     if family == "exponentially-modified-gaussian":
-        return [np.array([-0.5, np.log(0.6), np.log(s)]) for s in (0.3, 1.0)], [free, (-6, BOX), (-9, BOX)]
+        return [np.array([-0.5, np.log(0.6), np.log(s)]) for s in (0.3, 1.0)], [free, (-6.0, BOX), (-9.0, BOX)]
     if family == "gaussian-mixture":
         low, high = np.quantile(u, [0.3, 0.9])
         first = [
             np.array([0.0, low, high, np.log(0.5), np.log(0.8)]),
             np.array([-1.5, 0.0, 0.3, np.log(0.6), np.log(2.5)]),
         ]
-        return first, [(-9, 9), free, free, (-6, BOX), (-6, BOX)]
+        return first, [(-9.0, 9.0), free, free, (-6.0, BOX), (-6.0, BOX)]
     if family == "gamma":
-        return [np.array([np.log(u.mean() ** 2 / u.var()), np.log(u.var() / u.mean())])], [(-6, BOX), scale]
+        return [np.array([np.log(u.mean() ** 2 / u.var()), np.log(u.var() / u.mean())])], [(-6.0, BOX), scale]
     ends = float(u.min()), float(u.max())
     start = np.array([u.mean(), np.log(u.std()), *ends])
-    return [start], [(ends[0] - 20, ends[1] + 20), (-4, 5), (ends[0],) * 2, (ends[1],) * 2]
+    return [start], [(ends[0] - 20, ends[1] + 20), (-4.0, 5.0), (ends[0], ends[0]), (ends[1], ends[1])]
 
 
 @double_precision
@@ -339,13 +342,13 @@ def _compared(error_m, held: ndarray, family: str, start: float) -> LawCompariso
     except InputError as error:
         if "has no density" not in error.cause:
             raise
-        return LawComparison(family, None, note=error.cause)
+        return LawComparison(family, None, note=error.cause.partition(", where")[0])
     each = log_densities(fit.noise, held)
     impossible = int((each == -np.inf).sum())
     x = np.sort(held)
     F, n = np.asarray(fit.noise.cdf(jnp.asarray(x))), len(x)
     ks = float(max((np.arange(1, n + 1) / n - F).max(), (F - np.arange(n) / n).max()))
-    note = f"{impossible} held-out errors are outside its support" if impossible else ""
+    note = f"{impossible} of the held-out errors outside its support" if impossible else ""
     status = fit.noise.regularity().status
     return LawComparison(
         family, fit, float(each.mean()), impossible=impossible, ks=ks, regularity=status, note=note, per_error=each

@@ -285,9 +285,7 @@ def _interior(log_p: LogDensity, place: float, width: float) -> Finding | None:
     if b > 0.95 and abs(slopes[0][k] - slopes[1][k]) < 0.02 * max(abs(slopes[0][k]), abs(slopes[1][k])):
         return None
     name = "kink" if b > 0.95 else f"cusp t^{b:.3g}"
-    return Finding(
-        place, name, b, True, f"a {name} {where}: regular, but only E[score^2] is the information, -E[d score] is not"
-    )
+    return Finding(place, name, b, True, f"a {name} {where}: finite there, but only as E[score^2], not as -E[d score]")
 
 
 def _jump_or_steep(log_p: LogDensity, place: float, gap: float, width: float, where: str) -> Finding:

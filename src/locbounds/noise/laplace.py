@@ -32,7 +32,7 @@ class Laplace(Noise):
     Examples
     --------
     >>> print(Laplace(0.0, 1.0).regularity())
-    regular: Laplace: a kink at 0 m, exponent 1: regular, but only E[score^2] is the information, -E[d score] is not
+    regular: Laplace: a kink at 0 m, exponent 1: finite there, but only as E[score^2], not as -E[d score]
     """
 
     center: Scalar = eqx.field(converter=float64)

@@ -230,7 +230,7 @@ def judge(
         smooth = exponent > 1
         text = f"{'a change of curvature' if smooth else 'a ' + kind} {where}, exponent {exponent:.4g}"
         if not smooth:
-            text += ": regular, but only E[score^2] is the information, -E[d score] is not"
+            text += ": finite there, but only as E[score^2], not as -E[d score]"
         return Finding(place, kind, exponent, True, text)
     ends = {end for piece in (pieces[0][0], pieces[-1][1]) for end in (piece,)}
     edge = any(isclose(place, end, rel_tol=SAME_PLACE) for end in ends)
