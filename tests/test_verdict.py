@@ -8,7 +8,7 @@ import pytest
 
 import locbounds as lb
 from locbounds.noise import Regularity
-from locbounds.registry import METHODS, method
+from locbounds.registry import METHODS, bounds_of, method
 from locbounds.verdict import Status, dangers
 from scenarios import STEPS, asymmetric, noise_of
 
@@ -51,7 +51,9 @@ BOUNDS = {"bcrb": lb.bcrb, "enumer": lb.enumer, "los-only": lb.los_only, "known-
 
 
 def test_the_table_of_bounds_is_complete():
-    assert {id for id, m in METHODS.items() if m.kind == "bound"} == set(BOUNDS)
+    assert {m.id for m in bounds_of("scenario")} == set(BOUNDS)
+    assert found(METHODS["survey"].function) is lb.survey_bound
+    assert [m.id for m in bounds_of("survey")] == ["survey"]
     for id, bound in BOUNDS.items():
         assert found(METHODS[id].function) is bound
 

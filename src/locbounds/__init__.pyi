@@ -7,10 +7,29 @@ from .filters import Estimates, FactorisedImmEkf, ImmEkf, ImmKf, OracleEkf
 from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
+from .io.surveys import read_survey
 from .measurement import BySight, Range
 from .model import AdditiveChannel, DensityChannel, DensityMotion, JumpMarkov, jump_markov
 from .motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
-from .noise import Gaussian, GaussianMixture
+from .noise import (
+    Epoch,
+    Exponential,
+    ExponentiallyModifiedGaussian,
+    FromLogDensity,
+    FromNumPyro,
+    Gamma,
+    Gaussian,
+    GaussianMixture,
+    Laplace,
+    LogNormal,
+    Mixture,
+    Singularity,
+    StudentT,
+    TruncatedGaussian,
+    Uniform,
+    bhattacharyya,
+    minimum_error,
+)
 from .priors import DensityPrior, GaussianPrior
 from .registry import explain
 from .report import plot
@@ -18,6 +37,7 @@ from .result import Result, tightest
 from .scenario import Link, Scenario
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
+from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
 
 __version__: str
@@ -33,8 +53,15 @@ __all__ = [
     "DensityPrior",
     "Draws",
     "DwellSight",
+    "Epoch",
     "Estimates",
+    "Exponential",
+    "ExponentiallyModifiedGaussian",
     "FactorisedImmEkf",
+    "Fingerprints",
+    "FromLogDensity",
+    "FromNumPyro",
+    "Gamma",
     "Gaussian",
     "GaussianMixture",
     "GaussianPrior",
@@ -43,10 +70,13 @@ __all__ = [
     "InputError",
     "JumpMarkov",
     "KnownSight",
+    "Laplace",
     "LinearMotion",
     "Link",
     "LocboundsError",
+    "LogNormal",
     "MarkovSight",
+    "Mixture",
     "OracleEkf",
     "PrecisionError",
     "Prior",
@@ -55,10 +85,16 @@ __all__ = [
     "RefusedError",
     "Result",
     "Scenario",
+    "Singularity",
+    "StudentT",
     "SwitchingMotion",
     "Times",
+    "TruncatedGaussian",
+    "Uniform",
     "bcrb",
     "bcrb_algorithm1",
+    "bhattacharyya",
+    "discrete_mmse",
     "enumer",
     "evaluate",
     "explain",
@@ -67,11 +103,15 @@ __all__ = [
     "known_sight",
     "load",
     "los_only",
+    "minimum_error",
     "papers",
     "plot",
     "quantile",
     "read_log",
+    "read_survey",
     "save",
     "simulate",
+    "survey_bound",
+    "survey_model",
     "tightest",
 ]

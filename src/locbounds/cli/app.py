@@ -12,6 +12,7 @@ from locbounds.cli.failures import Program
 from locbounds.cli.fit import fit
 from locbounds.cli.new import new
 from locbounds.cli.paper import paper
+from locbounds.cli.survey import survey
 from locbounds.cli.track import track
 
 app = typer.Typer(
@@ -54,6 +55,7 @@ app.command()(new)
 app.command()(check)
 app.command()(track)
 app.command()(fit)
+app.command()(survey)
 app.command()(paper)
 app.command()(explain)
 

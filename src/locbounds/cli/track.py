@@ -75,13 +75,16 @@ def track(
 
 
 def _bounds(model: "Scenario", ids: str | None) -> "list[Method]":
-    from locbounds.registry import METHODS, method
+    from locbounds.registry import bounds_of, method
     from locbounds.verdict import Status
 
     if ids is not None:
-        return [] if ids == "none" else [method(id.strip(), "bound") for id in ids.split(",")]
-    applicable = [m for m in METHODS.values() if m.kind == "bound"]
-    applicable = [m for m in applicable if m.verdict(model).status is not Status.REFUSED]
+        chosen = [] if ids == "none" else [method(id.strip(), "bound") for id in ids.split(",")]
+        for m in chosen:
+            if m.subject != "scenario":
+                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", f"Run locbounds {m.subject}")
+        return chosen
+    applicable = [m for m in bounds_of("scenario") if m.verdict(model).status is not Status.REFUSED]
     known = any(m.id == "known-sight" for m in applicable)  # then nothing is left to average over
     return [m for m in applicable if not (known and m.id in ("bcrb", "enumer"))]
 
