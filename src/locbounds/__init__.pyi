@@ -15,6 +15,7 @@ from .registry import explain
 from .report import plot
 from .result import Result, tightest
 from .scenario import Link, Scenario
+from .scoring import Score, score
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
 from .times import Times
@@ -44,6 +45,7 @@ __all__ = [
     "RefusedError",
     "Result",
     "Scenario",
+    "Score",
     "Times",
     "bcrb",
     "bcrb_algorithm1",
@@ -59,6 +61,7 @@ __all__ = [
     "quantile",
     "read_log",
     "save",
+    "score",
     "simulate",
     "tightest",
 ]

@@ -132,6 +132,27 @@ def _draw_block(scenario: Scenario, seed: Array, block: Array, runs: int) -> Dra
 
 
 @double_precision
+def simulate_block(scenario: Scenario, *, seed: int, block: int) -> Draws:
+    """One block of :data:`RUNS_PER_BLOCK` tracks of :func:`simulate`: for more runs than fit into memory.
+
+    >>> import locbounds as lb
+    >>> scenario = lb.papers.fritsche2013.scenario(steps=10)
+    >>> few = lb.simulate(scenario, runs=3, seed=1).states
+    >>> bool(np.all(simulate_block(scenario, seed=1, block=0).states[:3] == few))
+    True
+    """
+    model = _checked(scenario, seed)
+    return jax.tree.map(np.asarray, _draw_block(model, np.uint32(seed), np.uint32(block), RUNS_PER_BLOCK))
+
+
+def _checked(scenario: Scenario, seed: int) -> Scenario:
+    check_seed(seed)
+    for link in scenario.links:
+        link.sight.transitions(scenario.times.intervals)  # raises where chain and times do not fit, as jit does not
+    return scenario.anonymous()
+
+
+@double_precision
 def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
     """Draw tracks, sight conditions and measurements.
 
@@ -167,10 +188,7 @@ def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
     """
     if runs < 1 or int(runs) != runs:
         raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 1")
-    check_seed(seed)
-    for link in scenario.links:
-        link.sight.transitions(scenario.times.intervals)  # raises where chain and times do not fit, as jit does not
-    model = scenario.anonymous()
+    model = _checked(scenario, seed)
     blocks = [
         _draw_block(model, np.uint32(seed), np.uint32(b), RUNS_PER_BLOCK) for b in range(-(-runs // RUNS_PER_BLOCK))
     ]

@@ -62,7 +62,7 @@ def track(
     from locbounds.io.scenario_file import load
 
     model = load(scenario)
-    chosen_bounds = _bounds(model, bounds)
+    chosen_bounds = applicable_bounds(model, bounds)
     chosen_filters = _filters(model, filters)
     if not chosen_bounds and not chosen_filters:
         raise InputError("neither a bound nor a filter was asked for", "Name at least one with --bounds or --filters")
@@ -74,7 +74,8 @@ def track(
             _on_model(model, chosen_bounds, chosen_filters, rtol, runs, seed, folder, json)
 
 
-def _bounds(model: "Scenario", ids: str | None) -> "list[Method]":
+def applicable_bounds(model: "Scenario", ids: str | None) -> "list[Method]":
+    """The bounds that were named, or all that apply."""
     from locbounds.registry import METHODS, method
     from locbounds.verdict import Status
 

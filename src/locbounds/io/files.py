@@ -146,6 +146,12 @@ class OutputFolder:
 
     def write(self, name: str, save: Callable[[Path], object]) -> None:
         """Write one file with a function of the path, for example ``figure.savefig`` or ``dataset.to_netcdf``."""
-        with atomic_path(self.path / name) as temporary:
+        with self.writing(name) as temporary:
             save(temporary)
+
+    @contextmanager
+    def writing(self, name: str) -> Iterator[Path]:
+        """A path to write one file to, in as many pieces as it takes; it gets its name when the block has ended."""
+        with atomic_path(self.path / name) as temporary:
+            yield temporary
         self.written.append(self.path / name)

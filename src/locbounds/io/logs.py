@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,7 @@ from locbounds.errors import InputError
 from locbounds.fit.range_log import RangeLog, Track
 from locbounds.io.csv_table import CsvTable
 
+C = TypeVar("C", bound=Any)
 LABELS = {"los": 0, "nlos": 1, "": -1, "unknown": -1}
 """What a label cell may say, in upper or lower case."""
 
@@ -74,19 +75,23 @@ class LogColumns:
     @classmethod
     def parse(cls, options: list[str] | tuple[str, ...]) -> LogColumns:
         """From options such as ``ranges.range=dist`` (file, key, column in the file)."""
-        columns = cls()
-        for option in options:
-            key, equals, name = option.partition("=")
-            file, dot, part = key.partition(".")
-            known = [f"{f.name}.{p.name}" for f in fields(cls) for p in fields(getattr(columns, f.name))]
-            if not (equals and dot and name) or key not in known:
-                near = difflib.get_close_matches(key, known, n=1, cutoff=0.3)
-                raise InputError(
-                    f'column mapping "{option}" is not FILE.KEY=COLUMN with a known key',
-                    f"Did you mean {near[0]}=...?" if near else f"Keys: {', '.join(known)}",
-                )
-            columns = replace(columns, **{file: replace(getattr(columns, file), **{part: name})})
-        return columns
+        return renamed(cls(), options)
+
+
+def renamed(columns: C, options: list[str] | tuple[str, ...]) -> C:
+    """Column names after options such as ``ranges.range=dist`` (file, key, column in the file)."""
+    for option in options:
+        key, equals, name = option.partition("=")
+        file, dot, part = key.partition(".")
+        known = [f"{f.name}.{p.name}" for f in fields(columns) for p in fields(getattr(columns, f.name))]
+        if not (equals and dot and name) or key not in known:
+            near = difflib.get_close_matches(key, known, n=1, cutoff=0.3)
+            raise InputError(
+                f'column mapping "{option}" is not FILE.KEY=COLUMN with a known key',
+                f"Did you mean {near[0]}=...?" if near else f"Keys: {', '.join(known)}",
+            )
+        columns = replace(columns, **{file: replace(getattr(columns, file), **{part: name})})
+    return columns
 
 
 def read_log(
