@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from locbounds.errors import InputError
-from locbounds.io.logs import LogColumns, read_log
+from locbounds.io.log_columns import LogColumns
+from locbounds.io.logs import read_log
 
 ANCHORS = "anchor_id,x_m,y_m\n1,0,0\n2,10,0\n"
 RANGES = "track_id,step,anchor_id,range_m\na,0,1,1.0\na,1,1,2.0\na,1,2,8.0\na,2,2,7.5\nb,0,2,3.0\nb,1,1,4.0\n"

@@ -48,7 +48,7 @@ def score(
     from locbounds.cli.output import output_folder, precision_progress, print_json, print_table
     from locbounds.cli.track import applicable_bounds
     from locbounds.io.estimates import Runs, ScoreColumns, read_estimates, read_truth, same_runs
-    from locbounds.io.logs import renamed
+    from locbounds.io.log_columns import renamed
     from locbounds.io.scenario_file import load
     from locbounds.report import plot, tables
     from locbounds.result import format_with_error, tightest

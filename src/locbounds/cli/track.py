@@ -7,7 +7,9 @@ import typer
 from locbounds.cli.log_options import (
     AnchorsOption,
     ColumnsOption,
+    EveryOption,
     HoldOutOption,
+    MergeOption,
     RangesOption,
     SelectOption,
     TimeOffsetOption,
@@ -46,7 +48,9 @@ def track(
     truth: TruthOption = None,
     select: SelectOption = None,
     hold_out: HoldOutOption = None,
-    time_offset: TimeOffsetOption = 0.0,
+    time_offset: TimeOffsetOption = "0",
+    merge: MergeOption = 0.0,
+    every: EveryOption = 1,
     columns: ColumnsOption = None,
     out: OutOption = None,
     json: JsonOption = False,
@@ -68,7 +72,7 @@ def track(
         raise InputError("neither a bound nor a filter was asked for", "Name at least one with --bounds or --filters")
     with output_folder(default_out(scenario, out), force=force) as folder:
         if ranges is not None or anchors is not None or truth is not None:
-            log = read(ranges, anchors, truth, select, time_offset, columns, None)
+            log = read(ranges, anchors, truth, select, time_offset, merge, every, columns, None)
             _along_log(model, log, hold_out, chosen_bounds, chosen_filters, rtol, seed, folder, json)
         else:
             _on_model(model, chosen_bounds, chosen_filters, rtol, runs, seed, folder, json)

@@ -11,7 +11,7 @@ import numpy as np
 from locbounds.axes import Array, Float, Int, ndarray
 from locbounds.errors import InputError
 from locbounds.io.csv_table import CsvTable
-from locbounds.io.logs import TruthColumns
+from locbounds.io.log_columns import TruthColumns
 from locbounds.io.runs import truth_columns
 from locbounds.scenario import Scenario
 
