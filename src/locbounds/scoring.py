@@ -256,9 +256,10 @@ def _covariance(values: Any, shape: tuple[int, ...]) -> Float[Array, "runs times
 def refuse_other_units(place: Array, true: Array) -> None:
     """Raise an InputError where estimates agree with the truth only in another unit, or with swapped coordinates."""
     moved = np.median(np.linalg.norm(place - true, axis=-1)[:, 1:])
-    for unit, factor in UNITS.items():
-        if np.median(np.linalg.norm(place / factor - true, axis=-1)[:, 1:]) < CLOSER * moved:
-            raise InputError(f"the estimates look like {unit}, the truth is in metres", "Convert them to metres")
+    left = {unit: np.median(np.linalg.norm(place / f - true, axis=-1)[:, 1:]) for unit, f in UNITS.items()}
+    best = min(left, key=lambda unit: left[unit])
+    if left[best] < CLOSER * moved:
+        raise InputError(f"the estimates look like {best}, the truth is in metres", "Convert them to metres")
     swapped = place[..., [1, 0, *range(2, place.shape[-1])]]
     if np.median(np.linalg.norm(swapped - true, axis=-1)[:, 1:]) < CLOSER * moved:
         raise InputError("the estimates have x and y swapped", "Order them as in the truth: x, y")

@@ -42,9 +42,7 @@ def write(folder, *, lag=LAG, tracks=2, seconds=40.0, noise=0.05, outliers=0.02,
 
 
 def read(folder, **options):
-    return lb.read_log(
-        folder / "ranges.csv", anchors=folder / "anchors.csv", truth=folder / "truth.csv", **options
-    )
+    return lb.read_log(folder / "ranges.csv", anchors=folder / "anchors.csv", truth=folder / "truth.csv", **options)
 
 
 def test_a_burst_ends_with_its_width_and_with_a_link_that_returns():

@@ -217,17 +217,17 @@ def _count(n: int, what: str) -> str:
 
 def _noise_comments(pooled: SightNoiseFit, noise: Mapping[str, SightNoiseFit], per_anchor: bool) -> dict[str, str]:
     def lines(prefix: str, fit: SightNoiseFit) -> dict[str, str]:
-        def error(*names: str) -> str:
+        def error(*names: str, unit: str = "") -> str:
             values = [fit.stderr[name] for name in names]
             if not np.isfinite(values).any():
                 return "no s.e. from one track" if fit.groups < 2 else "no s.e. from one such track or at a limit"
-            return "s.e. " + ", ".join(f"{value:.2g}" if np.isfinite(value) else "none" for value in values)
+            return "s.e. " + ", ".join(f"{value:.2g}" if np.isfinite(value) else "none" for value in values) + unit
 
         source = f"maximum likelihood, {_count(fit.groups, 'track')}, {_count(fit.ranges, 'range')}"
         found = {
-            f"{prefix}.los": f"{source}, {error('los_mean_m', 'los_std_m')} m (mean, deviation)",
-            f"{prefix}.nlos": f"{source}, {error('nlos_mean_m', 'nlos_std_m')} m (mean, deviation)",
-            f"{prefix}.sight": f"{source}, {error('los_dwell_s', 'nlos_dwell_s')} s; start: long-run shares",
+            f"{prefix}.los": f"{source}, {error('los_mean_m', 'los_std_m', unit=' m (mean, deviation)')}",
+            f"{prefix}.nlos": f"{source}, {error('nlos_mean_m', 'nlos_std_m', unit=' m (mean, deviation)')}",
+            f"{prefix}.sight": f"{source}, {error('los_dwell_s', 'nlos_dwell_s', unit=' s')}; start: long-run shares",
         }
         if fit.outliers:
             found[f"{prefix}.outlier"] = (

@@ -24,6 +24,13 @@ LABELS = {"los": 0, "nlos": 1, "": -1, "unknown": -1}
 MERGE_HINT = 1.5  # ranges per step below which anchors seem to report one after the other
 MERGE_HINT_RANGES = 100
 OTHER_UNIT = 100.0  # ranges this many times larger than all positions' extent cannot be in the same unit
+OTHER_UNITS = {"millimetres": 1e3, "centimetres": 1e2, "kilometres": 1e-3, "feet": 1 / 0.3048} | {
+    "microseconds": 1 / 299.792458,
+    "nanoseconds": 1 / 0.299792458,
+    "negative metres": -1.0,
+}
+FEWEST = 5  # ranges of one anchor from which a unit can be told
+AGREES = 0.2  # another unit is meant if the median error shrinks to less than this share with it
 DEGREES_SPREAD = 0.1
 """Positions that differ by less than this over a whole log look like degrees."""
 
@@ -148,7 +155,7 @@ def read_log(
         raise InputError("no range has a true position", "Compare track names, steps and times of both files")
     if labels is None:
         tracks = [replace(track, sight=None) for track in tracks]
-    _refuse_other_units(places, tracks)
+    _refuse_other_units(names, places, tracks, notes)
     return RangeLog(tuple(names), places, tuple(tracks), tuple(notes))
 
 
@@ -244,17 +251,61 @@ def _labels_of_truth(frame: Any, table: CsvTable, c: TruthColumns, labels: str, 
     return found
 
 
-def _refuse_other_units(places: Float[ndarray, "n space"], tracks: list[Track]) -> None:
-    """Refuse positions and ranges that cannot both be metres: degrees beside metres, or millimetres beside metres."""
+def _refuse_other_units(names: list[str], places: Float[ndarray, "n space"], tracks: list[Track], notes) -> None:
+    """Refuse positions and ranges that cannot both be metres, of any anchor; remark on single odd ranges."""
     everything = np.concatenate([places, *(t.position_m for t in tracks if t.position_m is not None)])
     extent = float(np.ptp(everything, axis=0).max())
-    typical = float(np.nanmedian(np.abs(np.concatenate([t.ranges_m.ravel() for t in tracks]))))
+    ranges = np.concatenate([t.ranges_m for t in tracks])
+    typical = float(np.nanmedian(np.abs(ranges)))
+    remedy = "Convert positions to metres in a local plane and ranges to metres"
+    if all(t.position_m is not None for t in tracks):
+        distance = np.concatenate([_distances(places, t) for t in tracks])
+        for m, name in enumerate(names):
+            there = np.isfinite(ranges[:, m])
+            unit = other_unit(ranges[there, m], distance[there, m]) if there.sum() >= FEWEST else ""
+            if unit:
+                raise InputError(
+                    f"the ranges to anchor {name} look like {unit}: about {np.median(ranges[there, m]):.4g}, where the "
+                    f"true distances are about {np.median(distance[there, m]):.3g} m",
+                    remedy,
+                )
+    elif np.nanmean(ranges < 0) > 0.5:
+        raise InputError("most ranges are negative", "Give distances in metres; check the sign")
     if typical > OTHER_UNIT * extent > 0:
         raise InputError(
             f"ranges are about {typical:.4g} m, but all positions lie within {extent:.3g} m: one of them is not in "
             "metres (positions in degrees? ranges in millimetres?)",
-            "Convert positions to metres in a local plane and ranges to metres",
+            remedy,
         )
+    below, beyond = np.sum(ranges < 0), np.sum(np.abs(ranges) > OTHER_UNIT * extent) if extent > 0 else 0
+    if below:
+        notes.append(
+            f"{below:,} of {np.isfinite(ranges).sum():,} ranges are negative, down to {np.nanmin(ranges):.3g} m; they "
+            "are kept: a device that subtracts a delay gives such ranges close to an anchor."
+        )
+    if beyond:
+        notes.append(
+            f"{beyond:,} ranges are longer than {OTHER_UNIT * extent:.3g} m, {OTHER_UNIT:g} times the extent of all "
+            "positions: are some rows in another unit?"
+        )
+
+
+def _distances(places: Float[ndarray, "n space"], track: Track) -> Float[ndarray, "steps n"]:
+    anchors = places if track.anchors_m is None else track.anchors_m
+    return np.linalg.norm(np.asarray(track.position_m)[1:, None] - anchors, axis=-1)
+
+
+def other_unit(values: Float[ndarray, " n"], distance: Float[ndarray, " n"]) -> str:
+    """The unit in which ranges agree far better with true distances than in metres; empty if in none.
+
+    >>> other_unit(np.array([5000.0, 7100.0]), np.array([5.1, 7.0])), other_unit(np.array([5.3]), np.array([5.0]))
+    ('millimetres', '')
+    """
+    if not len(values):
+        return ""
+    left = {unit: np.median(np.abs(values / factor - distance)) for unit, factor in OTHER_UNITS.items()}
+    best = min(left, key=lambda unit: left[unit])
+    return best if left[best] < AGREES * np.median(np.abs(values - distance)) else ""
 
 
 def _select(tables: Mapping[str, CsvTable], select: str | Mapping[str, str] | None) -> bool:
