@@ -27,7 +27,8 @@ def paper(
 ) -> None:
     """Reproduce a paper: its tables and figures, published beside computed with standard errors.
 
-    Writes table1.csv, fig1.csv and fig1.png for fritsche2013; after Ctrl-C the finished columns of Table I. The
+    Writes table1.csv, fig1.csv and fig1.png for fritsche2013; after Ctrl-C the finished columns of Table I
+    in partial-table1.csv. The
     table on the screen compares every published entry with the computed one.
 
     [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
@@ -40,6 +41,7 @@ def paper(
                 columns.extend(study.study(samples=samples, runs=runs, seed=seed, announce=say))
         except KeyboardInterrupt:
             if columns:
+                folder.partial = True
                 folder.write_text("table1.csv", study.table1_csv(columns))
             raise
         cells = study.table1(columns)

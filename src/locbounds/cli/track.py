@@ -59,7 +59,8 @@ def track(
     """Bounds on the tracking error over time, and what filters reach.
 
     Writes rmse.csv, run.nc and rmse.png. With a log of real ranges (--ranges, --anchors, --truth) the filters run on
-    the measured ranges instead of simulated ones and the bound is computed along the measured tracks.
+    the measured ranges instead of simulated ones and the bound is computed along the measured tracks. After Ctrl-C
+    what was finished is in partial-rmse.csv, partial-run.nc and partial-rmse.png.
 
     [bold]Example[/bold]: locbounds track scenario.toml --bounds bcrb,enumer --filters imm-ekf --rtol 1e-3
     """
@@ -117,6 +118,7 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
             with count_progress(filter.name) as progress:
                 results.append(evaluate_on(filter, model, draws, seed=seed, progress=progress))
     except KeyboardInterrupt:
+        folder.partial = True
         _save(results, model, folder)
         raise
     _save(results, model, folder)
@@ -155,13 +157,15 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
 
 
 def _save(results, model, folder) -> None:
-    """Files of what was computed, after Ctrl-C too."""
+    """Files of what was computed; after Ctrl-C they are called partial."""
     from locbounds.report import dataset, plot, tables
+
+    title = f"{model.title} (interrupted)" if folder.partial else model.title
 
     if results:
         folder.write_text("rmse.csv", tables.csv_text(tables.RMSE_COLUMNS, tables.rmse_rows(results)))
         folder.write("run.nc", lambda path: dataset.save(results, path))
-        folder.write("rmse.png", lambda path: plot.rmse(results, title=model.title).savefig(path, dpi=150))
+        folder.write("rmse.png", lambda path: plot.rmse(results, title=title).savefig(path, dpi=150))
 
 
 def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) -> None:

@@ -89,6 +89,13 @@ class OutputFolder:
     force
         Write into a foreign folder too.
 
+    Attributes
+    ----------
+    written
+        Files finished so far.
+    partial
+        Set it before writing what an interrupted command had computed: the files are then called ``partial-NAME``.
+
     Raises
     ------
     InputError
@@ -107,6 +114,7 @@ class OutputFolder:
         self.path = Path(path)
         self.force = force
         self.written: list[Path] = []
+        self.partial = False
         self._made: list[Path] = []
 
     def __enter__(self) -> "OutputFolder":
@@ -151,7 +159,13 @@ class OutputFolder:
 
     @contextmanager
     def writing(self, name: str) -> Iterator[Path]:
-        """A path to write one file to, in as many pieces as it takes; it gets its name when the block has ended."""
-        with atomic_path(self.path / name) as temporary:
+        """A path to write one file to, in as many pieces as it takes; it gets its name when the block has ended.
+
+        While :attr:`partial` is set, the name is ``partial-NAME``; the whole file later removes it.
+        """
+        target = self.path / (f"partial-{name}" if self.partial else name)
+        with atomic_path(target) as temporary:
             yield temporary
-        self.written.append(self.path / name)
+        self.written.append(target)
+        if not self.partial:
+            (self.path / f"partial-{name}").unlink(missing_ok=True)

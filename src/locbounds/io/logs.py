@@ -24,9 +24,9 @@ LABELS = {"los": 0, "nlos": 1, "": -1, "unknown": -1}
 MERGE_HINT = 1.5  # ranges per step below which anchors seem to report one after the other
 MERGE_HINT_RANGES = 100
 OTHER_UNIT = 100.0  # ranges this many times larger than all positions' extent cannot be in the same unit
-OTHER_UNITS = {"millimetres": 1e3, "centimetres": 1e2, "kilometres": 1e-3, "feet": 1 / 0.3048} | {
+OTHER_UNITS = {"millimetres": 1e3, "centimetres": 1e2, "kilometres": 1e-3} | {
     "microseconds": 1 / 299.792458,
-    "nanoseconds": 1 / 0.299792458,
+    "feet or nanoseconds": 3.3,  # 3.281 and 3.336
     "negative metres": -1.0,
 }
 FEWEST = 5  # ranges of one anchor from which a unit can be told

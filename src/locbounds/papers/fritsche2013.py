@@ -6,6 +6,7 @@ environments", IEEE Wireless Communications Letters, 2013.
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -77,6 +78,10 @@ REMARKS = (
 )
 
 
+class Stopped(Exception):  # noqa: N818 - not an error: nobody waits for the column any more
+    """Ends a column of the study whose consumer has gone."""
+
+
 class Cell(NamedTuple):
     """One entry of Table I: published, computed and its standard error, in metres."""
 
@@ -113,7 +118,16 @@ def study(
     >>> stay, [r.name for r in results]
     (0.6, ['IMM-KF', 'IMM-EKF', 'BCRB', 'Enumer-BCRB'])
     """
-    say = announce or (lambda what: None)
+    stopped = Event()  # after Ctrl-C running columns end at their next piece of work, not at their own end
+
+    def go_on(*_: object) -> None:
+        if stopped.is_set():
+            raise Stopped
+
+    def say(what: str) -> None:
+        go_on()
+        if announce is not None:
+            announce(what)
 
     def column(stay: float) -> tuple[float, list[Result]]:
         model = scenario(stay)
@@ -122,14 +136,17 @@ def study(
         results = []
         for filter in (ImmKf(covariance=False), ImmEkf(covariance=False)):
             say(f"stay {stay}: {filter.name}")
-            results.append(evaluate_on(filter, model, draws, seed=seed))
-        say(f"stay {stay}: bounds")
-        return stay, [*results, *(bound(model, samples=samples, seed=seed) for bound in (bcrb, enumer))]
+            results.append(evaluate_on(filter, model, draws, seed=seed, progress=go_on))
+        for bound in (bcrb, enumer):
+            say(f"stay {stay}: {bound.__name__}")
+            results.append(bound(model, samples=samples, seed=seed, progress=go_on))
+        return stay, results
 
     pool = ThreadPoolExecutor(COLUMNS_AT_ONCE)  # the numbers depend on the seed alone
     try:
         yield from pool.map(column, STAY)
     finally:
+        stopped.set()
         pool.shutdown(wait=False, cancel_futures=True)
 
 
