@@ -1,5 +1,5 @@
 # The public names: what type checkers see, and what is imported on first use (lazy-loader reads this file).
-from . import papers
+from . import papers, testing
 from .bounds import AlongTrack, Prior, bcrb, bcrb_algorithm1, enumer, known_sight, los_only
 from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
@@ -63,5 +63,6 @@ __all__ = [
     "save",
     "score",
     "simulate",
+    "testing",
     "tightest",
 ]
