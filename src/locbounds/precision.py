@@ -9,6 +9,7 @@ none of its arguments is a plain call: it is computed at once, and is a constant
 
 import functools
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, ParamSpec, TypeVar
 
 import jax
@@ -39,6 +40,12 @@ def _widen(leaf: Any) -> Any:
     return leaf
 
 
+def _at_once() -> AbstractContextManager:
+    """Compute now even inside a user's ``jit``, which would otherwise take over everything that is computed."""
+    being_traced = _is_tracer(jnp.zeros(()))
+    return jax.ensure_compile_time_eval() if being_traced else nullcontext()
+
+
 def double_precision(function: Callable[P, R]) -> Callable[P, R]:
     """Run a function in double precision, whatever the caller's JAX configuration is.
 
@@ -61,7 +68,7 @@ def double_precision(function: Callable[P, R]) -> Callable[P, R]:
                     'Add the line jax.config.update("jax_enable_x64", True) before the first use of JAX',
                 )
             return function(*args, **kwargs)
-        with jax.ensure_compile_time_eval(), jax.enable_x64(True):
+        with _at_once(), jax.enable_x64(True):
             args, kwargs = jax.tree.map(_widen, (args, kwargs))
             return jax.tree.map(_widen, function(*args, **kwargs))
 

@@ -47,6 +47,28 @@ class Link(eqx.Module):
     reports: Bool[Array, " steps"] | None = None
 
 
+def alike(links: tuple[Link, ...]) -> list[tuple[np.ndarray, Link]]:
+    """Links of the same structure as one link whose numbers have a leading axis, and which of the links these are.
+
+    What is the same for every link is then traced and compiled once for all of them, by ``jax.vmap``.
+
+    >>> import locbounds as lb
+    >>> [(index, link),] = alike(lb.papers.fritsche2013.scenario().links)
+    >>> index.tolist(), link.measurement.anchor.shape
+    ([0, 1, 2], (3, 2))
+    """
+    groups: dict[Any, list[int]] = {}
+    nameless = [Link("", a.measurement, a.sight, a.noises, a.reports) for a in links]
+    for m, link in enumerate(nameless):
+        leaves, structure = jax.tree.flatten(link)
+        groups.setdefault((structure, tuple((np.shape(x), jnp.result_type(x)) for x in leaves)), []).append(m)
+
+    def stack(*leaves):
+        return (jnp if any(isinstance(x, jax.Array) for x in leaves) else np).stack(leaves)
+
+    return [(np.array(index), jax.tree.map(stack, *(nameless[m] for m in index))) for index in groups.values()]
+
+
 class Scenario(eqx.Module):
     """Everything a bound or a filter needs to know; immutable, a JAX pytree with NumPy float64 leaves.
 

@@ -13,7 +13,7 @@ from locbounds.errors import InputError
 from locbounds.linalg import psd_root
 from locbounds.noise import Noise
 from locbounds.precision import double_precision, traced
-from locbounds.scenario import Scenario
+from locbounds.scenario import Link, Scenario, alike
 
 RUNS_PER_BLOCK = 1024
 
@@ -119,16 +119,20 @@ def _draw_block(scenario: Scenario, seed: Array, block: Array, runs: int) -> Dra
     states = draw_states(block_key(seed, Stream.TRACKS, block), scenario, runs)
     position = scenario.motion.position(states[:, 1:])
     intervals = jnp.asarray(scenario.times.intervals)
-    sights, measurements = [], []
-    for m, link in enumerate(scenario.links):
-        key = jax.random.fold_in(block_key(seed, Stream.MEASUREMENTS, block), m)
-        chain, noise = jax.random.split(key)
+    base = block_key(seed, Stream.MEASUREMENTS, block)
+
+    def observe(link: Link, m: Array) -> tuple[Array, Array]:
+        chain, noise = jax.random.split(jax.random.fold_in(base, m))
         r = draw_sight(chain, link.sight.start, link.sight.transitions(intervals), runs).T
         z = jax.vmap(jax.vmap(link.measurement))(position) + draw_noise(noise, link.noises, r)
-        reports = True if link.reports is None else jnp.asarray(link.reports)
-        sights.append(r)
-        measurements.append(jnp.where(reports, z, jnp.nan))
-    return Draws(states, jnp.stack(sights, -1), jnp.stack(measurements, -1))
+        return r, z if link.reports is None else jnp.where(link.reports, z, jnp.nan)
+
+    order, parts = zip(
+        *((index, jax.vmap(observe)(links, index)) for index, links in alike(scenario.links)), strict=True
+    )
+    back = np.argsort(np.concatenate(order))
+    sight, measurements = (jnp.moveaxis(jnp.concatenate(part)[back], 0, -1) for part in zip(*parts, strict=True))
+    return Draws(states, sight, measurements)
 
 
 @double_precision

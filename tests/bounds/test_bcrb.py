@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import locbounds as lb
-from locbounds.bounds.recursion import covariance_recursion
+from locbounds.bounds.recursion import GivenIncrements, covariance_recursion
 from scenarios import STEPS, Linear, asymmetric, kalman, mask, noise_of, prior
 
 ROUNDING = 1e-9  # relative; exact identities through some hundred operations
@@ -228,7 +228,7 @@ def test_the_recursion_is_the_last_block_of_the_inverse_at_every_horizon(scenari
         roots[k, 2 * (k + 1) :] = 0  # nothing is known about states before step 1
     D = np.einsum("kia,kja->kij", roots, roots)
     with jax.enable_x64(True):
-        P = np.asarray(covariance_recursion(scenario, D.reshape(STEPS, STEPS, 2, STEPS, 2)))
+        P = np.asarray(covariance_recursion(scenario, GivenIncrements(D.reshape(STEPS, STEPS, 2, STEPS, 2)))[0])
         F, Q = np.asarray(scenario.transition), np.asarray(scenario.process_noise)
     J = np.zeros((STEPS + 1, 4, STEPS + 1, 4))
     J[0, :, 0] = np.linalg.inv(scenario.prior.covariance)
@@ -241,6 +241,29 @@ def test_the_recursion_is_the_last_block_of_the_inverse_at_every_horizon(scenari
         size = 4 * (k + 1)
         expected = np.linalg.inv(J[: k + 1, :, : k + 1].reshape(size, size))[-4:, -4:]
         np.testing.assert_allclose(P[k], expected, rtol=1e-7)
+
+
+def test_changes_of_the_increments_are_followed_to_first_order(scenario):
+    """Against central differences of the recursion itself, whose value is checked above."""
+    rng = np.random.default_rng(3)
+    shape = STEPS, 3, 2
+    roots = 0.05 * rng.normal(size=(*shape, 6))
+    changes = 0.05 * rng.normal(size=(2, *shape, 6))
+    D = np.einsum("kiax,kjbx->kiajb", roots, roots)
+    dD = np.einsum("gkiax,kjbx->gkiajb", changes, roots)
+    dD = dD + np.transpose(dD, (0, 1, 4, 5, 2, 3))
+    with jax.enable_x64(True):
+        _, followed = covariance_recursion(scenario, GivenIncrements(D, dD))
+
+        def position_mse(D):
+            P = np.asarray(covariance_recursion(scenario, GivenIncrements(D))[0])
+            return P[:, 0, 0] + P[:, 1, 1]
+
+        h = 1e-5
+        differences = np.stack([(position_mse(D + h * d) - position_mse(D - h * d)) / (2 * h) for d in dD])
+    scale = np.abs(differences).max()
+    assert scale > 0.01
+    np.testing.assert_allclose(np.asarray(followed), differences, atol=1e-6 * scale)
 
 
 def test_the_same_seed_gives_the_same_bits(scenario, bound):

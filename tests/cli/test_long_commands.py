@@ -76,25 +76,27 @@ def test_ctrl_c_between_bounds_keeps_the_finished_one(tmp_path, monkeypatch):
     assert files(tmp_path / "s-out") == ["rmse.csv", "rmse.png", "run.nc"]  # the whole replaces the partial
 
 
-def test_ctrl_c_in_a_study_does_not_wait_for_the_columns_that_run(monkeypatch):
+def test_ctrl_c_in_a_study_does_not_wait_for_the_bounds_that_run(monkeypatch):
     from locbounds.papers import fritsche2013
 
     running, ended = threading.Event(), threading.Event()
 
-    def filtered(filter, model, stay, *, seed, progress):
-        if stay == fritsche2013.STAY[0]:
-            assert running.wait(10)
-            raise KeyboardInterrupt
+    def interrupted(*_, **__):
+        assert running.wait(10)
+        raise KeyboardInterrupt
+
+    def slow(model, *, samples, seed, progress):
         running.set()
         try:
             for _ in range(600):  # half a minute
                 time.sleep(0.05)
-                progress(0, 1)
+                progress(1, 1.0, 1.0)
         finally:
             ended.set()
 
-    monkeypatch.setattr(fritsche2013, "simulate", lambda model, **_: float(model.links[0].sight.transition[0, 0]))
-    monkeypatch.setattr(fritsche2013, "evaluate_on", filtered)
+    monkeypatch.setattr(fritsche2013, "simulate", lambda *_, **__: None)
+    monkeypatch.setattr(fritsche2013, "evaluate_on", interrupted)
+    monkeypatch.setattr(fritsche2013, "bcrb", slow)
     with pytest.raises(KeyboardInterrupt):
         next(fritsche2013.study(samples=1, runs=2))
     assert ended.wait(5)

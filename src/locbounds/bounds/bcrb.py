@@ -1,27 +1,26 @@
 """Bayesian Cramér-Rao bounds of jump-Markov and known-sight models, with noise and geometry separated."""
 
-from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from locbounds.axes import Array, Float
-from locbounds.blocks import GROUPS, Stream, block_key, check_seed
+from locbounds.blocks import GROUPS, check_seed
 from locbounds.bounds.common import bound_result, prepare
-from locbounds.bounds.expectation import Expectation, directions, windows
+from locbounds.bounds.expectation import Expectation
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
-from locbounds.bounds.recursion import covariance_deviations, covariance_recursion
+from locbounds.bounds.recursion import covariance_recursion
 from locbounds.bounds.score_covariance import NoiseProcess, noise_process, score_covariance_increments
+from locbounds.bounds.separated import SeparatedIncrements, geometry
 from locbounds.errors import InputError
 from locbounds.precision import double_precision, traced
 from locbounds.result import Result
 from locbounds.scenario import Scenario
 
 PATHS = 64  # noise paths per group and block
-TRACKS = 16  # tracks per group and block: the geometry varies far less than the noise
 FIRST_WINDOW = 12
-GROUPS_AT_ONCE = 8
 FEWEST_GROUPS = 16  # kept even for large tables: fewer say too little about a standard error
 TABLE_BYTES = 2.5e8  # above this size of one link's increments, fewer groups are kept
 
@@ -42,58 +41,31 @@ def _distinct(processes: list[NoiseProcess]) -> list[int]:
     return first
 
 
-@partial(jax.jit, static_argnames=("groups", "window", "sharing"))
-def _geometry(
-    scenario, expectation, seed, block, *, groups, window, sharing
-) -> Float[Array, "groups processes steps window space space"]:
-    """Group means of ``grad h(x_n) grad h(x_{n-lag})^T`` by step n and lag, summed over links that share noise."""
-    paths = groups * TRACKS if expectation.random else 1
-    u = directions(scenario, expectation, block_key(seed, Stream.TRACKS, block), paths)
-    u = u.reshape(u.shape[0], groups if expectation.random else 1, -1, *u.shape[2:])
-    by_link = jnp.einsum("lgnka,lgnkib->lgkiab", u, windows(u, window)) / u.shape[2]
-    return jnp.stack([by_link[np.array(links)].sum(0) for links in sharing], axis=1)
+class _Solution(NamedTuple):
+    """The bound from tables of score covariances and geometry, and its first-order changes."""
 
-
-def _information(C, G) -> Float[Array, "steps window space window space"]:
-    """Increments of the information about positions at ages i, j: noise part times geometry part, summed."""
-    window, steps = C.shape[-1], G.shape[1]
-    padded = jnp.concatenate([jnp.zeros((len(G), window - 1, *G.shape[2:])), G], axis=1)  # nothing before step 1
-    rows = []
-    for i in range(window):  # newer member at age i, the other one j - i steps before it
-        pairs = jax.lax.slice_in_dim(padded, window - 1 - i, window - 1 - i + steps, axis=1)[:, :, : window - i]
-        row = jnp.sum(C[:, :, i, i:, None, None] * pairs, 0)
-        rows.append(jnp.pad(row, ((0, 0), (i, 0), (0, 0), (0, 0))))
-    upper = jnp.swapaxes(jnp.stack(rows, axis=1), 2, 3)
-    i, j = np.meshgrid(np.arange(window), np.arange(window), indexing="ij")
-    return jnp.where((i <= j)[:, None, :, None], upper, jnp.transpose(upper, (0, 3, 4, 1, 2)))
+    estimate: Estimate
+    shorter: Float[Array, "2 times"]
 
 
 @jax.jit
-def _covariances(scenario, C, G) -> Float[Array, "times state state"]:
-    """Bound at every step from the means over all groups."""
-    return covariance_recursion(scenario, _information(C, G))
+def _solve(scenario, C, G) -> _Solution:
+    """The bound from the means of all groups, and how its position mean square error changes to first order.
 
-
-@jax.jit
-def _deviations(scenario, C, G) -> Float[Array, "groups times"]:
-    """Each group's deviation of the position mean square error, to first order (delta method)."""
-    C_mean, G_mean = C.mean(0), G.mean(0)
+    That is, with each group's own tables in place of the means (delta method), and with windows that are shorter by a
+    quarter and by a half.
+    """
     index = np.array(scenario.motion.position_index)
-    mean = _information(C_mean, G_mean)
-
-    def some_groups(start):
-        def change(C_group, G_group):  # independent draws of noise and geometry: their deviations add
-            noise, geometry = (C_group - C_mean, G_mean), (C_mean, G_group - G_mean)
-            return _information(*noise) + _information(*geometry)
-
-        C_some, G_some = (jax.lax.dynamic_slice_in_dim(x, start, GROUPS_AT_ONCE) for x in (C, G))
-        return covariance_deviations(scenario, mean, jax.vmap(change)(C_some, G_some))[..., index, index].sum(-1)
-
-    G = jnp.broadcast_to(G, (len(C), *G.shape[1:]))
-    return jax.lax.map(some_groups, jnp.arange(0, len(C), GROUPS_AT_ONCE)).reshape(len(C), -1)
+    mean = C.mean(0), G.mean(0)
+    ages = np.arange(C.shape[-1])
+    cuts = [(ages < length)[:, None] & (ages < length) for length in (-(-n * len(ages) // 4) for n in (3, 2))]
+    every_C = jnp.concatenate([C, mean[0] * np.stack(cuts)[:, None, None]])
+    every_G = G if len(G) == 1 else jnp.concatenate([G, mean[1][None], mean[1][None]])
+    P, changes = covariance_recursion(scenario, SeparatedIncrements(*mean, (every_C, every_G)))
+    return _Solution(Estimate(P, P[:, index, index].sum(-1), changes[:-2]), changes[-2:])
 
 
-def _truncation(scenario, C, G) -> float:
+def _truncation(solution: _Solution, left_out: float) -> float:
     """Relative error of the position RMSE at the worst step that is due to the window, extrapolated.
 
     The changes on shortening the window by a quarter and by a half say how fast they decay with its length:
@@ -101,17 +73,8 @@ def _truncation(scenario, C, G) -> float:
     ``quarter * q / (1 - q)``. Where that is less than the last quarter itself, that quarter is reported; where nothing
     decays, the last quarter as often as quarters were left out.
     """
-    index = np.array(scenario.motion.position_index)
-    C, G = C.mean(0), G.mean(0)
-    window = C.shape[-1]
-
-    def rmse(length):
-        kept = np.arange(window) < length
-        return jnp.sqrt(_covariances(scenario, C * (kept[:, None] & kept), G)[:, index, index].sum(-1))
-
-    full = rmse(window)
-    quarter, half = (float(jnp.max(jnp.abs(rmse(-(-n * window // 4)) / full - 1))) for n in (3, 2))
-    left_out = 4 * (scenario.steps - window) / window
+    relative = np.abs(solution.shorter) / (2 * np.asarray(solution.estimate.position_mse))
+    quarter, half = (float(change.max()) for change in relative)
     beyond = quarter / (half - 2 * quarter) if half > 2 * quarter else np.inf  # q / (1 - q)
     return quarter * max(1.0, min(beyond, left_out))
 
@@ -243,7 +206,6 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
     first = _distinct(processes)
     distinct = sorted(set(first))
     sharing = tuple(tuple(m for m, i in enumerate(first) if i == process) for process in distinct)
-    index = np.array(scenario.motion.position_index)
     size = min(FIRST_WINDOW if window is None else int(window), scenario.steps)
     fixed = samples is not None or differentiable
     while True:
@@ -258,28 +220,25 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
                 )
                 for i in distinct
             ]
-            G = _geometry(scenario, expectation, seed_key, b, groups=groups, window=size, sharing=sharing)
+            G = geometry(scenario, expectation, seed_key, b, groups=groups, window=size, sharing=sharing)
             return jnp.stack(C, axis=1), G
 
-        def evaluate(tables) -> Estimate:
-            C, G = tables
-            P = _covariances(scenario, C.mean(0), G.mean(0))
-            return Estimate(P, P[:, index, index].sum(-1), _deviations(scenario, C, G))
-
-        first_block = draw(0)
+        tables = draw(0)
+        solution = _solve(scenario, *tables)
         truncation = 0.0 if size == scenario.steps or id == "known-sight" else np.nan  # known sight: nothing to cut
         if window is None and size < scenario.steps and not differentiable:
-            truncation = _truncation(scenario, *first_block)
+            truncation = _truncation(solution, 4 * (scenario.steps - size) / size)
             if truncation > rtol_target / 10:
                 size = min(2 * size, scenario.steps)
                 continue
         estimate, done = refine(
-            lambda block, first=first_block, draw=draw: draw(block) if block else first,
-            evaluate,
+            draw,
+            lambda tables: _solve(scenario, *tables).estimate,
             rtol=rtol_target,
             blocks=blocks,
             samples_per_block=groups * PATHS,
             progress=progress,
+            first=(tables, solution.estimate),
         )
         break
     how = f"noise and geometry separated, Louis' identity, window of {size} steps"

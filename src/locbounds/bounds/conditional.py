@@ -4,6 +4,7 @@ Given the sight of every link the noises are independent over time, the informat
 and the bound obeys the covariance recursion ``P <- F P F' + Q``, ``P <- P (I + J_k P)^-1``.
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from locbounds.bounds.common import bound_result, prepare
 from locbounds.bounds.expectation import Expectation, directions
 from locbounds.bounds.precision_control import MAX_BLOCKS, Estimate, Progress, check_rtol, refine, relative_error
 from locbounds.bounds.score_covariance import mode_information, noise_process
-from locbounds.linalg import small_inverse, symmetrize
+from locbounds.linalg import small_inverse
 from locbounds.precision import double_precision, traced
 from locbounds.quadrature import deviations
 from locbounds.result import Result
@@ -30,25 +31,39 @@ TRACKS = 16  # tracks per group and block
 
 
 def conditional_recursion(
-    scenario: Scenario, information: Float[Array, "steps space space"]
-) -> Float[Array, "times state state"]:
+    scenario: Scenario,
+    information: Float[Array, "steps space space *batch"],
+    summary: Callable[[Array], Array] = lambda P: P,
+) -> Float[Array, "times ..."]:
     """Bound at every step when the measurement of step k adds this information about the position at step k.
 
-    Tichavský 1998 for linear Gaussian motion, in covariance form: Q and the prior may be singular.
+    Tichavský 1998 for linear Gaussian motion, in covariance form: Q and the prior may be singular. Schedules are the
+    last axes, so that the small products run over thousands of them at once; ``summary`` is what is kept of
+    ``P [state, state, *batch]`` at every step.
     """
     index = np.array(scenario.motion.position_index)
-    eye = jnp.eye(len(index))
+    state, batch = scenario.motion.state_size, information.shape[3:]
+
+    def alone(a):  # shared by all schedules
+        return jnp.asarray(a).reshape(*a.shape, *(1 for _ in batch))
+
+    def product(a, b):
+        return jnp.sum(a[:, :, None] * b[None], 1)
 
     def step(P, inputs):
         F, Q, J = inputs
-        P = F @ P @ F.T + Q
+        P = (F @ P.reshape(state, -1)).reshape(P.shape)
+        P = product(P, alone(F.T)) + alone(Q)
         cross = P[:, index]
-        P = symmetrize(P - cross @ (small_inverse(eye + J @ cross[index]) @ J) @ cross.T)
-        return P, P
+        A = alone(np.eye(len(index))) + product(J, cross[index])
+        inverse = jnp.moveaxis(small_inverse(jnp.moveaxis(A, (0, 1), (-2, -1))), (-2, -1), (0, 1))
+        P = P - product(product(cross, product(inverse, J)), jnp.swapaxes(cross, 0, 1))
+        P = 0.5 * (P + jnp.swapaxes(P, 0, 1))
+        return P, summary(P)
 
-    P0 = jnp.asarray(scenario.prior.covariance)
+    P0 = jnp.broadcast_to(alone(scenario.prior.covariance), (state, state, *batch))
     _, later = jax.lax.scan(step, P0, (scenario.transition, scenario.process_noise, information))
-    return jnp.concatenate([P0[None], later])
+    return jnp.concatenate([summary(P0)[None], later])
 
 
 @partial(jax.jit, static_argnames="groups")
@@ -89,14 +104,13 @@ def _schedules(scenario, seed, block, *, groups, los_ranges_only, differentiable
 @jax.jit
 def _group_means(scenario, schedules, G) -> Float[Array, "groups times state state"]:
     """Group means over schedules of the bound for a known schedule."""
-
-    def one(info):
-        return conditional_recursion(scenario, jnp.einsum("lk,lkab->kab", info, G))
-
+    J = jnp.einsum("gslk,lkab->kabgs", schedules.information, G)
     if schedules.weights is None:
-        return jax.vmap(lambda group: jax.vmap(one)(group).mean(0))(schedules.information)
-    weights = jnp.concatenate([schedules.weights[:1], schedules.weights])  # step 0 is the same for every schedule
-    return jnp.einsum("kgs,gskij->gkij", weights, jax.vmap(jax.vmap(one))(schedules.information))
+        P = conditional_recursion(scenario, J, lambda P: P.mean(-1))
+    else:
+        weights = jnp.concatenate([schedules.weights[:1], schedules.weights])  # step 0: the same for every schedule
+        P = jnp.einsum("kgs,kijgs->kijg", weights, conditional_recursion(scenario, J))
+    return jnp.moveaxis(P, -1, 0)
 
 
 @jax.jit
@@ -104,16 +118,22 @@ def _geometry_deviations(scenario, info, G) -> Float[Array, "groups times"]:
     """Each group's deviation of the position mse that is due to its tracks, to first order, over these schedules."""
     index = np.array(scenario.motion.position_index)
     mean = G.mean(0)
+    changes = jnp.broadcast_to(G, (info.shape[0], *G.shape[1:])) - mean
 
-    def deviation(info, change):
-        def position_mse(G):
-            return conditional_recursion(scenario, jnp.einsum("lk,lkab->kab", info, G))[:, index, index].sum(-1)
+    def position_mse(J):
+        return conditional_recursion(scenario, J, lambda P: P[index, index].sum(0).mean(-1))
 
-        return jax.jvp(position_mse, (mean,), (change,))[1]
+    J = jnp.einsum("gslk,lkab->kabgs", info, mean), jnp.einsum("gslk,glkab->kabgs", info, changes)
+    change = jax.jvp(position_mse, J[:1], J[1:])[1]
+    return deviations(change.T)[1]  # every group has its own schedules: their changes cancel up to sampling only
 
-    G = jnp.broadcast_to(G, (info.shape[0], *G.shape[1:]))
-    changes = jax.vmap(jax.vmap(deviation, (0, None)))(info, G - mean).mean(1)
-    return deviations(changes)[1]  # every group has its own schedules: their changes cancel up to sampling only
+
+@jax.jit
+def _estimate(scenario, group_means, from_tracks) -> Estimate:
+    """The mean over groups; the deviations of schedules and tracks, which are drawn independently, add."""
+    index = np.array(scenario.motion.position_index)
+    P, spread = deviations(group_means)
+    return Estimate(P, P[:, index, index].sum(-1), spread[:, :, index, index].sum(-1) + from_tracks)
 
 
 def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, progress) -> Result:
@@ -139,26 +159,22 @@ def _average_over_schedules(id, scenario, rtol, samples, seed, expectation, prog
             differentiable=differentiable,
         )
 
-    def estimate_from(group_means: Array) -> Estimate:
-        P, spread = deviations(group_means)
-        return Estimate(P, P[:, index, index].sum(-1), spread[:, :, index, index].sum(-1) + from_tracks)
-
-    index = np.array(scenario.motion.position_index)
-    few = _Schedules(schedules(0).information[:, :SCHEDULES_FOR_GEOMETRY], None)
+    first = schedules(0)
+    few = _Schedules(first.information[:, :SCHEDULES_FOR_GEOMETRY], None)
     tracks = blocks or 1  # blocks of tracks: doubled until they cause at most half of the permitted error
     while True:
         G = geometry(tracks)
         from_tracks = _geometry_deviations(scenario, few.information, G)
         if blocks is not None or not expectation.random or differentiable or tracks >= MAX_BLOCKS:
             break
-        P = _group_means(scenario, few, G.mean(0)).mean(0)
-        if relative_error(Estimate(P, P[:, index, index].sum(-1), from_tracks)) <= target / 2:
+        estimate = _estimate(scenario, _group_means(scenario, few, G.mean(0)), from_tracks)
+        if relative_error(estimate._replace(replicates=from_tracks)) <= target / 2:
             break
         tracks *= 2
     G_mean = G.mean(0)
     estimate, done = refine(
-        lambda block: _group_means(scenario, schedules(block), G_mean),
-        estimate_from,
+        lambda block: _group_means(scenario, schedules(block) if block else first, G_mean),
+        lambda group_means: _estimate(scenario, group_means, from_tracks),
         rtol=target,
         blocks=blocks or (1 if differentiable else None),
         samples_per_block=GROUPS * SCHEDULES,

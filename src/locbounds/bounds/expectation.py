@@ -15,7 +15,7 @@ import numpy as np
 from locbounds.axes import Array, Float
 from locbounds.errors import InputError
 from locbounds.precision import float64, traced
-from locbounds.scenario import Scenario
+from locbounds.scenario import Link, Scenario, alike
 from locbounds.simulation import draw_states
 
 
@@ -133,11 +133,9 @@ def directions(
 ) -> Float[Array, "links paths steps space"]:
     """Gradients of every link's measurement with respect to position."""
     x = expectation.positions(scenario, key, paths)
-    return jnp.stack([jax.vmap(jax.vmap(jax.grad(link.measurement)))(x) for link in scenario.links])
 
+    def of_link(link: Link) -> Array:
+        return jax.vmap(jax.vmap(jax.grad(link.measurement)))(x)
 
-def windows(u: Float[Array, "*n steps space"], size: int) -> Float[Array, "*n steps window space"]:
-    """For every step the last ``size`` entries, newest first; zero before the first step."""
-    steps = u.shape[-2]
-    padded = jnp.concatenate([jnp.zeros((*u.shape[:-2], size - 1, u.shape[-1])), u], axis=-2)
-    return padded[..., np.arange(steps)[:, None] + size - 1 - np.arange(size), :]
+    order, parts = zip(*((index, jax.vmap(of_link)(links)) for index, links in alike(scenario.links)), strict=True)
+    return jnp.concatenate(parts)[np.argsort(np.concatenate(order))]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
+import numpy as np
 
 from locbounds.axes import Array, Float
 from locbounds.errors import InputError
@@ -39,8 +40,8 @@ def check_rtol(rtol: float | None, samples: int | None, is_traced: bool = False)
 
 def relative_error(estimate: Estimate) -> float:
     """Largest relative standard error of the position RMSE over the steps."""
-    mse = estimate.position_mse
-    return float((0.5 * standard_error(estimate.replicates) / jax.numpy.where(mse > 0, mse, 1.0)).max())
+    mse = np.asarray(estimate.position_mse)
+    return float((0.5 * standard_error(np.asarray(estimate.replicates)) / np.where(mse > 0, mse, 1.0)).max())
 
 
 def refine(
@@ -51,6 +52,7 @@ def refine(
     blocks: int | None,
     samples_per_block: int,
     progress: Progress | None = None,
+    first: tuple[Any, Estimate] | None = None,
 ) -> tuple[Estimate, int]:
     """Average blocks in index order until the estimate is precise enough.
 
@@ -66,19 +68,25 @@ def refine(
         A fixed number of blocks instead (no look at the target).
     samples_per_block, progress
         For reporting.
+    first
+        Tables of block 0 and the estimate from them, where they are known already.
 
     Returns
     -------
     Estimate, int
         The estimate and the number of blocks used; at most ``MAX_BLOCKS`` where the target cannot be reached.
     """
-    total, done, look = None, 0, blocks or 1
+    if first is None:
+        tables = draw(0)
+        first = tables, evaluate(tables)
+    total, estimate = first
+    done, look = 1, blocks or 1
     while True:
-        while done < look:
-            tables = draw(done)
-            total = tables if total is None else jax.tree.map(lambda a, b: a + b, total, tables)
-            done += 1
-        estimate = evaluate(jax.tree.map(lambda t, n=done: t / n, total))
+        if done < look:
+            while done < look:
+                total = jax.tree.map(lambda a, b: a + b, total, draw(done))
+                done += 1
+            estimate = evaluate(jax.tree.map(lambda t, n=done: t / n, total))
         if traced(estimate):
             return estimate, done
         error = relative_error(estimate)

@@ -6,6 +6,9 @@ information matrix ``J_{0:k}`` at every k; with a shorter one, older information
 window.
 """
 
+from abc import ABC, abstractmethod
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,69 +18,112 @@ from locbounds.linalg import symmetrize
 from locbounds.scenario import Scenario
 
 
+class Increments(ABC):
+    """What the measurement of every step adds to the information about the positions at ages 0..W-1 (age 0: now).
+
+    Attributes
+    ----------
+    ages
+        The window W.
+    groups
+        How many changes of the increments are followed besides (0: none).
+    pieces
+        Pytree with the steps as leading axis: what :meth:`advance` gets of each step.
+    """
+
+    ages: int
+    groups: int
+    pieces: Any
+
+    @abstractmethod
+    def first(self) -> Any:
+        """What is carried along before step 1."""
+
+    @abstractmethod
+    def advance(self, carried: Any, piece: Any) -> tuple[Any, Array, Array | None]:
+        """Carried further, the step's increment [W*space, W*space], and its changes [W*space, groups, W*space]."""
+
+
+class GivenIncrements(Increments):
+    """Increments that are known as arrays.
+
+    Parameters
+    ----------
+    increments
+        [steps, W, space, W, space].
+    changes
+        [groups, steps, W, space, W, space], or None.
+    """
+
+    def __init__(self, increments: Array, changes: Array | None = None):
+        self.ages = increments.shape[1]
+        self.groups = 0 if changes is None else len(changes)
+        size = self.ages * increments.shape[2]
+        flat = jnp.asarray(increments).reshape(-1, size, size)
+        if changes is not None:
+            changes = jnp.moveaxis(jnp.asarray(changes), 0, 3).reshape(-1, size, self.groups, size)
+        self.pieces = flat, changes
+
+    def first(self) -> Any:
+        return None
+
+    def advance(self, carried: Any, piece: Any) -> tuple[Any, Array, Array | None]:
+        return carried, *piece
+
+
 def covariance_recursion(
-    scenario: Scenario, increments: Float[Array, "steps window space window space"]
-) -> Float[Array, "times state state"]:
-    """Bound on the mean square error matrix at steps 0..K.
+    scenario: Scenario, increments: Increments
+) -> tuple[Float[Array, "times state state"], Float[Array, "groups times"]]:
+    """Bound on the mean square error matrix at steps 0..K, and first-order changes of its position part.
 
     Parameters
     ----------
     scenario
         Motion and prior are taken from it.
     increments
-        Information that the measurement of step k adds about the positions at ages 0..W-1 (age 0 is step k).
+        The information that the steps add.
+
+    Returns
+    -------
+    covariance
+        [steps+1, state, state].
+    changes
+        Of the position mean square error, one row per change of the increments, [groups, steps+1].
 
     Notes
     -----
     Window covariance S of [x_k, position at age 1, ..., position at age W-1]; predict ``S <- T S T' + Q``, update
-    ``S <- S - S_p (I + D S_pp)^-1 D S_p'`` with the information increment D on the positions p.
-    """
-    n = scenario.motion.state_size
-    window = _Window(scenario, increments.shape[1])
-
-    def step(S, inputs):
-        F, Q, D = inputs
-        S = window.update(window.predict(S, F, Q), D)
-        return S, S[:n, :n]
-
-    inputs = (scenario.transition, scenario.process_noise, window.flat(increments))
-    return jnp.concatenate(
-        [jnp.asarray(scenario.prior.covariance)[None], jax.lax.scan(step, window.first(), inputs)[1]]
-    )
-
-
-def covariance_deviations(
-    scenario: Scenario,
-    increments: Float[Array, "steps window space window space"],
-    changes: Float[Array, "groups steps window space window space"],
-) -> Float[Array, "groups times state state"]:
-    """First-order changes of :func:`covariance_recursion` for several changes of the increments.
-
-    From ``dS <- T dS T'`` and ``d (S^-1 + D)^-1 = K dS K' - S+ dD S+`` with ``K = S+ S^-1 = I - S+ D``: all groups
+    ``S <- S - S_p (I + D S_pp)^-1 D S_p'`` with the information increment D on the positions p. Changes follow from
+    ``dS <- T dS T'`` and ``d (S^-1 + D)^-1 = K dS K' - S_p+ dD S_p+'`` with ``K = S+ S^-1 = I - S_p+ D``: all of them
     share the matrices, so that each step is four matrix products.
     """
-    n = scenario.motion.state_size
-    window = _Window(scenario, increments.shape[1])
-    groups = len(changes)
+    n, groups = scenario.motion.state_size, increments.groups
+    window = _Window(scenario, increments.ages)
+    index = np.array(scenario.motion.position_index)
 
     def step(carry, inputs):
-        S, dS = carry
-        F, Q, D, dD = inputs
+        S, dS, carried = carry
+        F, Q, piece = inputs
+        carried, D, dD = increments.advance(carried, piece)
         S = window.update(window.predict(S, F, Q), D)
-        L = S[:, window.observed]
-        M = (jnp.eye(window.size).at[:, window.observed].add(-L @ D)) @ window.shift(F)
-        dS = jnp.einsum("ab,gbc,dc->gad", M, dS, M) - jnp.einsum("ab,gbc,dc->gad", L, dD, L)
-        return (S, dS), dS[:, :n, :n]
+        if dD is not None:
+            L = S[:, window.observed]
+            M = (jnp.eye(window.size).at[:, window.observed].add(-L @ D)) @ window.shift(F)
+            dS = _congruence(M, dS) - _congruence(L, dD)
+        return (S, dS, carried), (S[:n, :n], dS[index, :, index].sum(0))
 
-    inputs = (
-        scenario.transition,
-        scenario.process_noise,
-        window.flat(increments),
-        jnp.moveaxis(window.flat(changes), 0, 1),
-    )
-    first = (window.first(), jnp.zeros((groups, window.size, window.size)))
-    _, later = jax.lax.scan(step, first, inputs)
-    return jnp.concatenate([jnp.zeros((groups, 1, n, n)), jnp.moveaxis(later, 0, 1)], axis=1)
+    first = window.first(), jnp.zeros((window.size, groups, window.size)), increments.first()
+    inputs = scenario.transition, scenario.process_noise, increments.pieces
+    _, (later, changes) = jax.lax.scan(step, first, inputs)
+    P = jnp.concatenate([jnp.asarray(scenario.prior.covariance)[None], later])
+    return P, jnp.concatenate([jnp.zeros((groups, 1)), changes.T], axis=1)
+
+
+def _congruence(A: Float[Array, "a b"], X: Float[Array, "b groups b"]) -> Float[Array, "a groups a"]:
+    """``A X_g A'`` for every group, as two matrix products."""
+    a, b = A.shape
+    left = (A @ X.reshape(b, -1)).reshape(-1, b)
+    return (left @ A.T).reshape(a, -1, a)
 
 
 class _Window:
@@ -96,9 +142,6 @@ class _Window:
 
     def first(self) -> Float[Array, "size size"]:
         return jnp.zeros((self.size, self.size)).at[: self.n, : self.n].set(self.prior)
-
-    def flat(self, D: Float[Array, "*n w d w d"]) -> Float[Array, "*n observed observed"]:
-        return D.reshape(*D.shape[:-4], len(self.observed), len(self.observed))
 
     def shift(self, F: Float[Array, "state state"]) -> Float[Array, "size size"]:
         corner = jnp.zeros((self.size, self.size)).at[: self.n, : self.n].set(F)

@@ -97,8 +97,8 @@ def score_covariance_increments(
     sight = draw_sight(chain, process.start, process.transitions, n)
     w = draw_noise(noise, process.noises, sight)
     reported = process.reports[:, None, None]
-    log_l = jnp.where(reported, jnp.stack([law.log_prob(w) for law in process.noises], -1), 0.0)
-    s = jnp.where(reported, jnp.stack([law.score(w) for law in process.noises], -1), 0.0)
+    log_l = jnp.where(reported, jnp.stack([law.log_prob(w) for law in process.noises], 1), 0.0)  # [steps, modes, n]
+    s = jnp.where(reported, jnp.stack([law.score(w) for law in process.noises], 1), 0.0)
     known = mode_probabilities(process) @ mode_information(process) * process.reports
 
     weights = None  # of the paths in each group, by step
@@ -106,35 +106,35 @@ def score_covariance_increments(
         weights = equal_weights(likelihood_ratios(sight, process.start, process.transitions), groups)
 
     def step(carry, inputs):
-        p, d = carry  # [n, modes], [n, modes-1, window]: d[., r, i] at age i, given r_{k-1} = r + 1
+        p, d = carry  # [modes, n], [modes-1, window, n]: d[r, i] at age i, given r_{k-1} = r + 1
         T, log_l, s, known, weight = inputs
+        weight = jnp.full((groups, paths), 1 / paths) if weight is None else weight
 
         def mean(x: Array) -> Array:  # over the paths of each group
-            x = x.reshape(groups, paths, *x.shape[1:])
-            return x.mean(1) if weight is None else jnp.einsum("gn,gn...->g...", weight, x)
+            return jnp.sum(x.reshape(*x.shape[:-1], groups, paths) * weight, -1)
 
-        log_l = jnp.where(p @ T > 0, log_l, -jnp.inf)  # a mode that cannot be has no say in the scale
-        joint = p[:, :, None] * T * jnp.exp(log_l - jnp.max(log_l, -1, keepdims=True))[:, None, :]
-        joint = joint / joint.sum((1, 2), keepdims=True)
-        p_new, q = joint.sum(1), joint.sum(2)
-        s_with = jnp.sum(joint * s[:, None, :], -1)  # E[s_k ; r_{k-1} = r | w_{1:k}]
-        a = s_with.sum(-1)
+        log_l = jnp.where(T.T @ p > 0, log_l, -jnp.inf)  # a mode that cannot be has no say in the scale
+        joint = p[:, None] * T[:, :, None] * jnp.exp(log_l - jnp.max(log_l, 0))  # [modes before, modes now, n]
+        joint = joint / joint.sum((0, 1))
+        p_new, q = joint.sum(0), joint.sum(1)
+        s_with = jnp.sum(joint * s, 1)  # E[s_k ; r_{k-1} = r | w_{1:k}]
+        a = s_with.sum(0)
 
-        older = d[:, :, :-1]
-        newest = known - mean(jnp.sum(p_new * s**2, -1) - a**2)
-        c = s_with - a[:, None] * q
-        cross = -mean(jnp.sum(c[:, 1:, None] * older, 1))
-        xi = jnp.sum((q - p)[:, 1:, None] * older, 1).reshape(groups, paths, window - 1)
-        weighted = xi / paths if weight is None else xi * weight[:, :, None]
-        old = jnp.einsum("gni,gnj->gij", weighted, xi)
-        top = jnp.concatenate([newest[:, None, None], cross[:, None, :]], -1)
-        increment = jnp.concatenate([top, jnp.concatenate([cross[:, :, None], old], -1)], -2)
+        older = d[:, :-1]
+        newest = known - mean(jnp.sum(p_new * s**2, 0) - a**2)
+        c = s_with - a * q
+        cross = -mean(jnp.sum(c[1:, None] * older, 0))
+        xi = jnp.sum((q - p)[1:, None] * older, 0).reshape(window - 1, groups, paths)
+        old = jnp.einsum("ign,jgn->ijg", xi * weight, xi)
+        top = jnp.concatenate([newest[None, None], cross[None]], 1)
+        increment = jnp.concatenate([top, jnp.concatenate([cross[:, None], old], 1)], 0)
 
-        backward = joint / jnp.where(p_new > 0, p_new, 1.0)[:, None, :]  # Pr(r_{k-1} | r_k, w_{1:k})
-        apart = backward[:, 1:, 1:] - backward[:, 1:, :1]
-        kept = sum((apart[:, r, :, None] * older[:, r, None] for r in range(modes - 1)), jnp.zeros(()))
-        return (p_new, jnp.concatenate([(s[:, 1:] - s[:, :1])[:, :, None], kept], -1)), increment
+        backward = joint / jnp.where(p_new > 0, p_new, 1.0)  # Pr(r_{k-1} | r_k, w_{1:k})
+        apart = backward[1:, 1:] - backward[1:, :1]
+        kept = sum((apart[r, :, None] * older[r] for r in range(modes - 1)), jnp.zeros(()))
+        return (p_new, jnp.concatenate([(s[1:] - s[:1])[:, None], kept], 1)), increment
 
-    first = (jnp.broadcast_to(jnp.asarray(process.start), (n, modes)), jnp.zeros((n, modes - 1, window)))
+    start = jnp.broadcast_to(jnp.asarray(process.start)[:, None], (modes, n))
+    first = start, jnp.zeros((modes - 1, window, n))
     _, increments = jax.lax.scan(step, first, (process.transitions, log_l, s, known, weights))
-    return jnp.moveaxis(increments, 0, 1)
+    return jnp.moveaxis(increments, -1, 0)

@@ -89,4 +89,5 @@ class MarkovSight(Sight):
                 f"to {np.max(intervals):.4g} s",
                 "Give mean dwell times instead (dwell_s in a scenario file, DwellSight in Python)",
             )
-        return jnp.broadcast_to(jnp.asarray(self.transition), (len(intervals), *self.transition.shape))
+        broadcast = jnp.broadcast_to if traced(self.transition) else np.broadcast_to
+        return broadcast(self.transition, (len(intervals), *self.transition.shape))

@@ -17,7 +17,7 @@ SAME = 1e-6  # relative; sums in another order
 
 
 def check_filter(filter: Callable[..., Any]) -> None:
-    """Check a filter of your own: ``filter(scenario, z, seed) -> estimates``, as `locbounds.evaluate` takes it.
+    """Check a filter of your own: ``filter(scenario, z, seed) -> estimates``, for `locbounds.evaluate`.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def check_filter(filter: Callable[..., Any]) -> None:
     ``estimates``: finite, [runs, steps+1 or steps, state or space]. ``missing ranges``: so also where ranges are NaN.
     ``past only``: later ranges do not change earlier estimates. ``each run alone``: runs in another order give the same
     estimates. ``reproducible``: the same seed gives the same. ``input``: the ranges are left as they were.
-    ``covariances``, if it returns any: positive semidefinite. ``learns``: with two links the error at the end is smaller
-    than that of never looking at the ranges.
+    ``covariances``, if it returns any: positive semidefinite. ``learns``: with two links the error at the end is
+    smaller than that of never looking at the ranges.
 
     Examples
     --------
