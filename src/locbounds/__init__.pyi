@@ -1,5 +1,5 @@
 # The public names: what type checkers see, and what is imported on first use (lazy-loader reads this file).
-from . import papers
+from . import papers, testing
 from .bounds import AlongTrack, Prior, bcrb, bcrb_algorithm1, enumer, known_sight, los_only
 from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
@@ -35,6 +35,7 @@ from .registry import explain
 from .report import plot
 from .result import Result, tightest
 from .scenario import Link, Scenario
+from .scoring import Score, score
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
 from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
@@ -85,6 +86,7 @@ __all__ = [
     "RefusedError",
     "Result",
     "Scenario",
+    "Score",
     "Singularity",
     "StudentT",
     "SwitchingMotion",
@@ -110,8 +112,10 @@ __all__ = [
     "read_log",
     "read_survey",
     "save",
+    "score",
     "simulate",
     "survey_bound",
     "survey_model",
+    "testing",
     "tightest",
 ]

@@ -6,7 +6,9 @@ Docs tables, ``locbounds explain``, verdicts and the command line's choices are 
 import importlib
 from typing import Any, NamedTuple
 
+from locbounds.assumptions import COMMON
 from locbounds.errors import InputError
+from locbounds.scenario import Scenario
 from locbounds.verdict import (
     KNOWN_SIGHT,
     LOS_AND_NLOS,
@@ -68,6 +70,10 @@ class Method(NamedTuple):
         """Whether it applies to a scenario (or to a survey model)."""
         return judge(self.assumptions, subject, grounds=self.grounds, conditions=self.conditions + conditions)
 
+    def check(self, scenario: Scenario) -> list[tuple[str, str | None]]:
+        """Every assumption in words, and why a scenario violates it (None where it does not)."""
+        return [(a.text, a.violated(scenario)) for a in self.assumptions]
+
 
 METHODS: dict[str, Method] = {
     m.id: m
@@ -84,7 +90,7 @@ METHODS: dict[str, Method] = {
             "Not a bound for filters that are told the sight, nor for the error along one fixed track; optimistic when "
             "real errors are correlated in time beyond the chain.",
             ("fritsche2013", "louis1982"),
-            (SMOOTH_NOISE,),
+            (*COMMON, SMOOTH_NOISE),
         ),
         Method(
             "enumer",
@@ -98,7 +104,7 @@ METHODS: dict[str, Method] = {
             "Ignores that the sight has to be inferred, hence often loose; neither always above nor always below the "
             "BCRB.",
             ("hernandez2005", "fritsche2013"),
-            (SMOOTH_NOISE, SEPARABLE),
+            (*COMMON, SMOOTH_NOISE, SEPARABLE),
         ),
         Method(
             "known-sight",
@@ -111,7 +117,7 @@ METHODS: dict[str, Method] = {
             "Needs the schedule; along one given track it is a conditional number that bounds no error over random "
             "tracks.",
             ("chen2010", "tichavsky1998"),
-            (SMOOTH_NOISE, KNOWN_SIGHT, SEPARABLE),
+            (*COMMON, SMOOTH_NOISE, KNOWN_SIGHT, SEPARABLE),
         ),
         Method(
             "los-only",
@@ -123,7 +129,7 @@ METHODS: dict[str, Method] = {
             (),
             "Not a bound for filters that use NLOS ranges; right where the NLOS excess is unknown and arbitrary.",
             ("qi2006",),
-            (SMOOTH_NOISE, LOS_AND_NLOS, SEPARABLE),
+            (*COMMON, SMOOTH_NOISE, LOS_AND_NLOS, SEPARABLE),
             ("estimators that discard NLOS ranges, or an NLOS excess about which nothing is known",),
         ),
         Method(
@@ -274,13 +280,15 @@ def describe(entry: Method) -> dict[str, Any]:
     }
 
 
-def explain(id: str) -> str:
-    """What a bound or filter assumes, when it misleads, and whom to cite.
+def explain(id: str, scenario: Scenario | None = None) -> str:
+    """What a bound or filter assumes, when it misleads, and whom to cite; made from the table of methods.
 
     Parameters
     ----------
     id
         Id of a method, for example ``bcrb``, or the topic ``regularity``.
+    scenario
+        If given, every assumption is checked for it, and the verdict added.
 
     Raises
     ------
@@ -291,10 +299,19 @@ def explain(id: str) -> str:
     --------
     >>> print(explain("bcrb").splitlines()[0])
     BCRB (bcrb), a bound
+    >>> import locbounds as lb
+    >>> print(explain("known-sight", lb.papers.fritsche2013.scenario()).splitlines()[-2][:60])
+    violated the sight of every link is known at every step: the
     """
     if id in TOPICS:
         return TOPICS[id]
     entry = describe(method(id))
     lines = [f"{entry['name']} ({entry['id']}), a {entry['kind']}", entry["summary"], ""]
     lines += [f"sees     {', '.join(entry['sees'])}", *(f"assumes  {text}" for text in entry["assumes"])]
-    return "\n".join([*lines, f"careful  {entry['fails']}", f"cite     {', '.join(entry['cite'])}"])
+    lines += [f"careful  {entry['fails']}", f"cite     {', '.join(entry['cite'])}"]
+    if scenario is not None:
+        lines += ["", f"for      {scenario.title or 'this scenario'}"]
+        checks = method(id).check(scenario)
+        lines += [f"violated {text}: {why}" if why else f"holds    {text}" for text, why in checks]
+        lines += [f"verdict  {method(id).verdict(scenario)}"]
+    return "\n".join(lines)

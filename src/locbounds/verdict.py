@@ -167,6 +167,9 @@ def dangers(scenario: Scenario) -> tuple[str, ...]:
     if traced(scenario):
         return ()
     found: dict[str, list[str]] = {}
+    if not np.any(np.asarray(scenario.reports)):
+        names = [link.name for link in scenario.links]
+        found["no range is ever reported: every number is the prior's prediction"] = names
     intervals = scenario.times.intervals
     for link in scenario.links:
         if isinstance(link.sight, MarkovSight | DwellSight):

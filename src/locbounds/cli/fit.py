@@ -8,8 +8,10 @@ import typer
 from locbounds.cli.log_options import (
     AnchorsOption,
     ColumnsOption,
+    EveryOption,
     HoldOutOption,
     LabelsOption,
+    MergeOption,
     SelectOption,
     TimeOffsetOption,
     TruthOption,
@@ -25,7 +27,9 @@ def fit(
     truth: TruthOption = None,
     select: SelectOption = None,
     hold_out: HoldOutOption = None,
-    time_offset: TimeOffsetOption = 0.0,
+    time_offset: TimeOffsetOption = "0",
+    merge: MergeOption = 0.0,
+    every: EveryOption = 1,
     labels: LabelsOption = None,
     columns: ColumnsOption = None,
     per_anchor: Annotated[bool, typer.Option("--per-anchor", help="Noise and dwell times for every anchor.")] = False,
@@ -58,7 +62,7 @@ def fit(
 
     with output_folder(default_out(ranges.name.split(".")[0], out), force=force) as folder:
         with status("reading") as say:
-            log = read(ranges, anchors, truth, select, time_offset, columns, labels)
+            log = read(ranges, anchors, truth, select, time_offset, merge, every, columns, labels)
             kept, held = log.hold_out(hold_out) if hold_out is not None else (log, None)
             say(f"fitting {kept.ranges:,} ranges of {len(kept.tracks)} tracks")
             title = f"Fitted to {ranges.name}" + (f", {select}" if select else "")

@@ -32,8 +32,9 @@ def paper(
 ) -> None:
     """Reproduce a paper: its tables and figures, published beside computed with standard errors.
 
-    fritsche2013 writes table1.csv, fig1.csv and fig1.png; after Ctrl-C the finished columns of Table I. The table on
-    the screen compares every published entry with the computed one. mcguire2009 writes fig9.csv and fig9.png.
+    fritsche2013 writes table1.csv, fig1.csv and fig1.png; after Ctrl-C the finished columns of Table I in
+    partial-table1.csv. The table on the screen compares every published entry with the computed one. mcguire2009 writes
+    fig9.csv and fig9.png.
 
     [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
     """
@@ -54,6 +55,7 @@ def _fritsche2013(folder, samples: int | None, runs: int, seed: int, json: bool)
             columns.extend(study.study(samples=samples, runs=runs, seed=seed, announce=say))
     except KeyboardInterrupt:
         if columns:
+            folder.partial = True
             folder.write_text("table1.csv", study.table1_csv(columns))
         raise
     cells = study.table1(columns)
