@@ -45,6 +45,13 @@ class Singularity(NamedTuple):
         Its coefficients on both sides.
     logarithm
         Whether that part carries a factor ``log |t|``.
+
+    Examples
+    --------
+    A density that starts at 2 m like ``0.5 t``:
+
+    >>> Singularity(place=2.0, exponent=1.0, left=0.0, right=0.5).exponent
+    1.0
     """
 
     place: float
