@@ -116,7 +116,7 @@ def _compared(error_m, held: ndarray, group: ndarray, family: str, start: float 
     x = np.sort(held)
     F, n = np.asarray(fit.noise.cdf(jnp.asarray(x))), len(x)
     ks = float(max((np.arange(1, n + 1) / n - F).max(), (F - np.arange(n) / n).max()))
-    notes = [f"{impossible} held-out errors impossible"] if impossible else []
+    notes = [f"impossible held out: {impossible}"] if impossible else []
     if family in ONE_SIDED and start is None:
         notes.append("start fitted")
     status = fit.noise.regularity().status

@@ -56,7 +56,7 @@ def law_figure(comparisons: Mapping[str, Sequence[LawComparison]], held_out: Map
         top, bottom = panels[:, column]
         top.set_title(f"{name}: {len(e):,} held-out errors", fontsize=10)
         top.legend(fontsize=8, frameon=False)
-        top.set_ylim(0, 1.25 * counts.max())
+        top.set_ylim(0, 1.1 * max([counts.max(), *(np.max(line.get_ydata()) for line in top.lines)]))
         bottom.set_yscale("log")
         bottom.set_ylim(0.5 * counts[counts > 0].min(), 2 * counts.max())
         bottom.set_xlabel("range error in m")
