@@ -77,7 +77,8 @@ def print_laws(laws: Laws) -> None:
 
     for name, table in laws.items():
         title = f"Laws of the error, {name}: mean log density (1/m) of held-out errors"
-        print_table(title, HEADER[1:], [row[1:] for row in table])
+        shown = [k for k, column in enumerate(HEADER) if column not in ("errors of", "numbers")]
+        print_table(title, [HEADER[k] for k in shown], [[row[k] for k in shown] for row in table])
         typer.echo(winner(name, laws.comparisons[name]) + "\n")
 
 
@@ -88,7 +89,7 @@ def winner(name: str, rows: "list[LawComparison]") -> str:
         return f"{name}: every law calls some of the held-out errors impossible."
     near = [row.family for row in rows[1:] if row.behind <= SIGMAS * row.behind_stderr]
     also = f"; within {SIGMAS:g} standard errors of it: {', '.join(near)}" if near else ", and no other is near"
-    return f"{name}: {best.family} is best{also}."
+    return f"{name}: {best.family} is best ({_numbers(best.fit.noise)}){also}."
 
 
 def compare_only(ranges: Path, noise: str, out: Path, *, force: bool, json: bool, **options: Any) -> None:
