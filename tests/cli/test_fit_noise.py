@@ -12,6 +12,7 @@ import locbounds as lb
 from locbounds.cli.app import app
 from locbounds.cli.fit_noise import compare, with_best_laws
 from locbounds.fit import RangeLog, Track, errors_of_log
+from locbounds.io.range_errors import read_errors
 
 
 @pytest.fixture(scope="module")
@@ -96,9 +97,6 @@ def run(*arguments):
 def test_a_survey_at_points_and_its_table_give_the_same_laws(survey, tmp_path):
     ways = {
         "files": (*FILES, "--labels", "los", "--hold-out", "split=test"),
-        "last": (*FILES, "--labels", "los", "--hold-out", "2"),
-        "named": (*FILES, "--labels", "los", "--hold-out", "p6,p7"),
-        "distance": ("table.csv", "--distance", "true_m", "--points", "spot", "--labels", "kind", "--hold-out", "2"),
         "errors": ("table.csv", "--errors", "error_m", "--points", "spot", "--labels", "kind", "--hold-out", "2"),
     }
     texts = {}
@@ -109,6 +107,15 @@ def test_a_survey_at_points_and_its_table_give_the_same_laws(survey, tmp_path):
         assert sorted(path.name for path in (tmp_path / name).glob("noise*")) == ["noise.csv", "noise.png"]
         texts[name] = (tmp_path / name / "noise.csv").read_text()
     assert len(set(texts.values())) == 1
+    files = {"anchors": "anchors.csv", "truth": "points.csv", "points": "spot"}
+    first, *others = (
+        read_errors("samples.csv", labels="los", hold_out=which, **files) for which in ("split=test", "2", "p6,p7")
+    )
+    table = read_errors("table.csv", distance="true_m", points="spot", labels="kind", hold_out="split=test")
+    for other in (*others, table):
+        for name, part in first.by_sight().items():
+            np.testing.assert_array_equal(part.error_m, other.by_sight()[name].error_m)
+            np.testing.assert_array_equal(part.held, other.by_sight()[name].held)
     rows = list(csv.DictReader(texts["errors"].splitlines()))
     table = np.genfromtxt(tmp_path / "table.csv", delimiter=",", names=True, dtype=None, encoding=None)
     fit, held = (table["error_m"][(table["kind"] == "LOS") & (table["split"] == part)] for part in ("train", "test"))

@@ -16,6 +16,7 @@ the smallest error, and refined by a bounded search between the neighbours of it
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
@@ -53,7 +54,8 @@ def _gamma(t: ndarray, start: float) -> tuple[Noise, float]:
     def equation(log_k: float) -> float:
         return log_k - float(digamma(np.exp(log_k))) - gap
 
-    k = float(np.exp(brentq(equation, *np.log(SHAPES))))
+    root: Any = brentq(equation, *np.log(SHAPES))
+    k = float(np.exp(root))
     scale = mean / k
     return Gamma(k, scale, start), float((k - 1) * log - k - gammaln(k) - k * np.log(scale))
 
@@ -134,4 +136,5 @@ def _best(e: ndarray, law: Callable[[ndarray, float], tuple[Noise, float]], fami
             "no best start: the likelihood is highest as it goes to minus infinity, where the law is Gaussian",
             f"Give start_m to the {family} law, or use another one",
         )
-    return float(minimize_scalar(lambda x: -profile(x), bounds=(grid[k - 1], grid[k + 1]), method="bounded").x)
+    found: Any = minimize_scalar(lambda x: -profile(x), bounds=(grid[k - 1], grid[k + 1]), method="bounded")
+    return float(found.x)

@@ -48,7 +48,10 @@ class RangeErrors(NamedTuple):
         there = np.isfinite(self.error_m)
         labelled = bool((self.sight >= 0).any())
         parts = {"LOS": self.sight == 0, "NLOS": self.sight == 1} if labelled else {"all": there}
-        return {name: RangeErrors(*(x[there & part] for x in self[:4])) for name, part in parts.items()}
+        return {name: self._cut(there & part) for name, part in parts.items()}
+
+    def _cut(self, keep: Bool[ndarray, " errors"]) -> RangeErrors:
+        return RangeErrors(self.error_m[keep], self.sight[keep], self.group[keep], self.held[keep])
 
 
 def errors_of_log(kept: RangeLog, held: RangeLog | None) -> RangeErrors:
@@ -69,4 +72,5 @@ def errors_of_log(kept: RangeLog, held: RangeLog | None) -> RangeErrors:
         e = log.errors()
         track = np.broadcast_to(e.track[:, None] + out * len(kept.tracks), e.error_m.shape)
         parts.append([x.ravel() for x in (e.error_m, e.sight, track, np.full(e.error_m.shape, bool(out)))])
-    return RangeErrors(*(np.concatenate(x) for x in zip(*parts, strict=True)))
+    error, sight, track, out = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return RangeErrors(error, sight, track, out)
