@@ -17,7 +17,8 @@ b(r)``, ``c = sum_r c(r) b(r)``. Nothing is left out, whatever the window: it on
 constant. See docs/theory/score.md.
 """
 
-from functools import partial
+from functools import partial, reduce
+from operator import add
 from typing import NamedTuple
 
 import jax
@@ -36,6 +37,7 @@ from locbounds.simulation import draw_noise
 from locbounds.sight.draws import next_sight
 
 RIDGE = 1e-10  # of the scaled window covariance, which is singular where the motion is
+
 
 class Corrected(NamedTuple):
     """What one block of draws says about the bound at steps 0..K.
@@ -62,74 +64,92 @@ class Corrected(NamedTuple):
 
 
 class _Chains(NamedTuple):
-    """What is carried for links of one structure; the last axis runs over draws, those that make V first."""
+    """What is carried for links of one structure; groups lead, those that make V (the pilot) before the others."""
 
-    sight: Int[Array, "links n"]
+    sight: Int[Array, "groups links paths"]
     law: Float[Array, "links modes"]
-    p: Float[Array, "modes links n"]
-    all: Float[Array, "size others links n"]  # E[T | r] - E[T | 0]
-    recent: Float[Array, "ages_space others links pilot"]  # the same of every score in the window by itself
+    p: list[Float[Array, "groups links paths"]]  # by mode
+    all: Float[Array, "groups size others links paths"]  # E[T | r] - E[T | 0]
+    recent: Float[Array, "pilot ages_space others links paths"]  # the same of every score in the window by itself
 
 
 class _News(NamedTuple):
     """What the new measurement says about the modes before and now."""
 
-    p: Float[Array, "modes links n"]
-    change: Float[Array, "others links n"]  # q - p at the modes that are not the first
-    cross: Float[Array, "others links n"]  # c
-    gain: Float[Array, "links n"]  # known-mode information minus Var(s_k | w_{1:k})
-    mixing: Float[Array, "others others links n"]  # backward kernel's differences, [before, now]
-    jump: Float[Array, "others links n"]  # s(r) - s(0)
+    p: list[Float[Array, "groups links paths"]]
+    change: list[Float[Array, "groups links paths"]]  # q - p at the modes that are not the first
+    cross: list[Float[Array, "groups links paths"]]  # c
+    gain: Float[Array, "groups links paths"]  # known-mode information minus Var(s_k | w_{1:k})
+    mixing: list[list[Float[Array, "groups links paths"]]]  # backward kernel's differences, [before][now]
+    jump: list[Float[Array, "groups links paths"]]  # s(r) - s(0)
 
 
 def _hear(p, T, noises: tuple[Noise, ...], w, known, reported) -> _News:
-    """One step of the filter of the modes, for all links and draws."""
-
-    def each(function):
-        value = jnp.stack([jax.vmap(function)(law, w) for law in noises])
-        return jnp.where(reported[:, None], value, 0.0)
-
-    log_l, s = each(lambda law, w: law.log_prob(w)), each(lambda law, w: law.score(w))
-    T = jnp.moveaxis(T, 0, -1)[..., None]  # [before, now, links, 1]
-    joint = p[:, None] * T
-    log_l = jnp.where(joint.sum(0) > 0, log_l, -jnp.inf)  # a mode that cannot be has no say in the scale
-    joint = joint * jnp.exp(log_l - jnp.max(log_l, 0))
-    joint = joint / joint.sum((0, 1))
-    now, before = joint.sum(0), joint.sum(1)
-    with_mode = jnp.sum(joint * s, 1)  # E[s_k ; r_{k-1} = r | w_{1:k}]
-    a = with_mode.sum(0)
-    backward = joint / jnp.where(now > 0, now, 1.0)
-    return _News(
-        now,
-        (before - p)[1:],
-        (with_mode - a * before)[1:],
-        jnp.where(reported, known, 0.0)[:, None] - jnp.sum(now * s**2, 0) + a**2,
-        backward[1:, 1:] - backward[1:, :1],
-        s[1:] - s[:1],
+    """One step of the filter of the modes, for all links and draws; modes are unrolled, so that XLA fuses them."""
+    modes = range(len(noises))
+    here = reported[:, None]
+    log_l, s = (
+        [jnp.where(here, jax.vmap(of, (0, 1), 1)(law, w), 0.0) for law in noises]
+        for of in (lambda law, w: law.log_prob(w), lambda law, w: law.score(w))
+    )
+    joint = [[p[i] * T[:, i, j, None] for j in modes] for i in modes]  # [before][now]
+    log_l = [jnp.where(_total(joint[i][j] for i in modes) > 0, log_l[j], -jnp.inf) for j in modes]  # else no say
+    top = log_l[0]
+    for other in log_l[1:]:
+        top = jnp.maximum(top, other)
+    l = [jnp.exp(log_l[j] - top) for j in modes]
+    scale = 1 / _total(joint[i][j] * l[j] for i in modes for j in modes)
+    joint = [[joint[i][j] * (l[j] * scale) for j in modes] for i in modes]
+    now = [_total(joint[i][j] for i in modes) for j in modes]
+    before = [_total(joint[i]) for i in modes]
+    a = _total(now[j] * s[j] for j in modes)
+    per_now = [1 / jnp.where(now[j] > 0, now[j], 1.0) for j in modes]
+    others = modes[1:]
+    return jax.lax.optimization_barrier(
+        _News(
+            now,
+            [before[i] - p[i] for i in others],
+            [_total(joint[i][j] * s[j] for j in modes) - a * before[i] for i in others],
+            jnp.where(here, known[:, None], 0.0) - _total(now[j] * s[j] ** 2 for j in modes) + a**2,
+            [[joint[i][j] * per_now[j] - joint[i][0] * per_now[0] for j in others] for i in others],
+            [s[j] - s[0] for j in others],
+        )
     )
 
 
+def _total(terms):
+    return reduce(add, terms)
+
+
 def _growth(
-    older: Float[Array, "size others links n"], l: Float[Array, "size links n"], news: _News, groups: int
+    older: Float[Array, "groups size others links paths"], l: Float[Array, "groups size links paths"], news: _News
 ) -> Float[Array, "groups size size"]:
     """Group sums of ``xi xi' - c l' - l c' + l gain l'``: two matrix products per group."""
-    size = len(l)
 
     def rows(x):
-        x = x.reshape(size, x.shape[1], groups, -1)
-        return jnp.transpose(x, (2, 0, 1, 3)).reshape(groups, size, -1)
+        return x.reshape(*x.shape[:2], -1)
 
-    xi = rows(jnp.sum(news.change * older, 1))
-    half = rows(0.5 * news.gain * l - jnp.sum(news.cross * older, 1))
+    def over(modes):
+        return sum(mode[:, None] * older[:, :, i] for i, mode in enumerate(modes))
+
+    xi = rows(over(news.change))
+    half = rows(0.5 * news.gain[:, None] * l - over(news.cross))
     one_side = half @ jnp.swapaxes(rows(l), 1, 2)
     return xi @ jnp.swapaxes(xi, 1, 2) + one_side + jnp.swapaxes(one_side, 1, 2)
 
 
 def _mix(older, l, news: _News):
     """``E[T_k | r_k = j] - E[T_k | r_k = 0]`` from those of the step before."""
-    others = older.shape[1]
-    kept = sum(news.mixing[i] * older[:, i, None] for i in range(others))
-    return kept + news.jump * l[:, None]
+    others = range(older.shape[2])
+    each = [
+        sum(news.mixing[i][j][:, None] * older[:, :, i] for i in others) + news.jump[j][:, None] * l for j in others
+    ]
+    return jnp.stack(each, 2)
+
+
+def _times(M: Float[Array, "a b"], x: Float[Array, "groups b *n"]) -> Float[Array, "groups a *n"]:
+    product = jnp.broadcast_to(M, (len(x), *M.shape)) @ x.reshape(*x.shape[:2], -1)
+    return product.reshape(len(x), len(M), *x.shape[2:])
 
 
 def _constants(links: list[Link], scenario: Scenario) -> tuple[NoiseProcess, Array]:
@@ -152,7 +172,7 @@ def corrected_bound(
     pilot: int,
     window: int,
 ) -> Corrected:
-    """One block: ``pilot`` draws make V, together with those of earlier blocks, ``groups * paths`` others the value.
+    """One block: ``pilot`` groups of paths make V, with those of earlier blocks, ``groups`` others the value.
 
     Every step's draws have a key of their own, so that what is computed for a step does not depend on how many come
     after it. What is carried from step to step does not grow with them.
@@ -161,28 +181,28 @@ def corrected_bound(
     n_state, index = len(model.P0), np.array(model.position)
     S_window = Window(model, window)
     size, space = S_window.size, len(index)
-    main = groups * paths
-    n = pilot + main
+    every = pilot + groups
+    n = every * paths
     tracks, noise = (block_key(seed, stream, block) for stream in (Stream.TRACKS, Stream.SIGHT_AND_NOISE))
     kinds = alike(scenario.links)
     constants = [_constants([scenario.links[m] for m in members], scenario) for members, _ in kinds]
     streamed = isinstance(expectation, Prior)
     roots = psd_root(scenario.process_noise)
-    given = None
-    if not streamed:
-        given = jnp.moveaxis(expectation.positions(scenario, tracks, n), 0, 1)
+    given = None if streamed else jnp.moveaxis(expectation.positions(scenario, tracks, n), 0, 1)
 
     def first_chains(process: NoiseProcess, number: int) -> _Chains:
         links, modes = process.start.shape
         keys = jax.vmap(partial(jax.random.fold_in, jax.random.fold_in(noise, 0)))(number + jnp.arange(links))
-        u = jax.vmap(lambda key: jax.random.uniform(key, (n,)))(keys)
-        sight = jax.vmap(lambda law, u: next_sight(law[None], jnp.zeros(n, int), u))(process.start, u)
+
+        def draw(law, key):
+            return next_sight(law[None], jnp.zeros((every, paths), int), jax.random.uniform(key, (every, paths)))
+
         return _Chains(
-            sight,
+            jax.vmap(draw, 0, 1)(process.start, keys),
             process.start,
-            jnp.broadcast_to(process.start.T[:, :, None], (modes, links, n)),
-            jnp.zeros((size, modes - 1, links, n)),
-            jnp.zeros((window * space, modes - 1, links, pilot)),
+            [jnp.broadcast_to(process.start[:, r, None], (every, links, paths)) for r in range(modes)],
+            jnp.zeros((every, size, modes - 1, links, paths)),
+            jnp.zeros((pilot, window * space, modes - 1, links, paths)),
         )
 
     offsets = np.cumsum([0, *(len(members) for members, _ in kinds)])
@@ -207,19 +227,20 @@ def corrected_bound(
 
             def draw(key, T, sight, noises):
                 change, disturb = jax.random.split(key)
-                sight = next_sight(T, sight, jax.random.uniform(change, (n,)))
+                sight = next_sight(T, sight, jax.random.uniform(change, sight.shape))
                 return sight, draw_noise(disturb, noises, sight)
 
-            sight, w = jax.vmap(draw)(keys, T, chain.sight, process.noises)
+            def gradients(link):
+                return jnp.moveaxis(jax.vmap(jax.grad(link.measurement))(position).reshape(every, paths, space), 2, 1)
+
+            drawn = jax.vmap(draw, (0, 0, 1, 0), 1)(keys, T, chain.sight, process.noises)
+            (sight, w), u = jax.lax.optimization_barrier((drawn, jax.vmap(gradients, 0, 2)(like)))  # compute once
             law = jnp.einsum("li,lij->lj", chain.law, T)
-            known = jnp.sum(law * info, -1)
-            news = _hear(chain.p, T, process.noises, w, known, reported)
-            u = jax.vmap(lambda link: jax.vmap(jax.grad(link.measurement))(position))(like)
-            u = jnp.moveaxis(u, -1, 0)
-            of_pilot = jax.tree.map(lambda x: x[..., :pilot], news)
-            recent = jnp.concatenate([jnp.zeros_like(chain.recent[:space]), chain.recent[:-space]])
-            l = jnp.zeros((window * space, links, pilot)).at[:space].set(u[..., :pilot])
-            own += _growth(recent, l, of_pilot, 1)[0] / pilot
+            news = _hear(chain.p, T, process.noises, w, jnp.sum(law * info, -1), reported)
+            of_pilot = jax.tree.map(lambda x: x[:pilot], news)
+            recent = jnp.concatenate([jnp.zeros_like(chain.recent[:, :space]), chain.recent[:, :-space]], 1)
+            l = jnp.zeros((pilot, window * space, links, paths)).at[:, :space].set(u[:pilot])
+            own += _growth(recent, l, of_pilot).sum(0) / (pilot * paths)
             recent = _mix(recent, l, of_pilot)
             heard.append((_Chains(sight, law, news.p, chain.all, recent), news, u))
 
@@ -227,18 +248,13 @@ def corrected_bound(
         S = S_window.update(S_window.predict(S, F, Q), D)
         P = S[:, S_window.observed]
         M = (jnp.eye(size).at[:, S_window.observed].add(-P @ D)) @ S_window.shift(F)
-        growth_pilot, growth = jnp.zeros((size, size)), jnp.zeros((groups, size, size))
-        chains = []
+        growth, chains = jnp.zeros((every, size, size)), []
         for chain, news, u in heard:
-            older = (M @ chain.all.reshape(size, -1)).reshape(chain.all.shape)
-            l = (P[:, :space] @ u.reshape(space, -1)).reshape(size, *u.shape[1:])
-            before, after = (jax.tree.map(lambda x, part=part: x[..., part], (older, l, news))
-                             for part in (slice(pilot), slice(pilot, None)))
-            growth_pilot += _growth(*before, 1)[0] / pilot
-            growth += _growth(*after, groups) / paths
+            older, l = _times(M, chain.all), _times(P[:, :space], u)
+            growth += _growth(older, l, news) / paths
             chains.append(chain._replace(all=_mix(older, l, news)))
-        missing_pilot = M @ missing_pilot @ M.T + P @ own @ P.T - growth_pilot
-        missing = M @ missing @ M.T + P @ D @ P.T - growth
+        missing_pilot = M @ missing_pilot @ M.T + P @ own @ P.T - growth[:pilot].mean(0)
+        missing = M @ missing @ M.T + P @ D @ P.T - growth[pilot:]
 
         A = _best_combination(S, missing_pilot, n_state)
         mean = missing.mean(0)

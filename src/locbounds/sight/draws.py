@@ -28,7 +28,15 @@ def next_sight(
     >>> next_sight(jnp.array([[0.9, 0.1], [0.2, 0.8]]), jnp.array([0, 0, 1]), jnp.array([0.5, 0.95, 0.1])).tolist()
     [0, 1, 0]
     """
-    return jnp.sum(u[..., None] >= jnp.cumsum(transition[sight], -1)[..., :-1], -1)
+    modes = len(transition)
+    below = jnp.cumsum(jnp.asarray(transition), -1)
+    return sum(
+        (
+            (u >= sum((jnp.where(sight == i, below[i, j], 0.0) for i in range(modes)), 0.0)).astype(int)
+            for j in range(below.shape[1] - 1)
+        ),
+        jnp.zeros(u.shape, int),
+    )
 
 
 def draw_sight(
