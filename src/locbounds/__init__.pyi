@@ -1,5 +1,5 @@
 # The public names: what type checkers see, and what is imported on first use (lazy-loader reads this file).
-from . import papers
+from . import papers, testing
 from .bounds import AlongTrack, Prior, bcrb, bcrb_algorithm1, bcrb_block_tridiagonal, enumer, known_sight, los_only
 from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
@@ -7,17 +7,38 @@ from .filters import Estimates, FactorisedImmEkf, ImmEkf, ImmKf, OracleEkf
 from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
+from .io.surveys import read_survey
 from .measurement import BySight, Range
 from .model import AdditiveChannel, DensityChannel, DensityMotion, JumpMarkov, jump_markov
 from .motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
-from .noise import Gaussian, GaussianMixture
+from .noise import (
+    Epoch,
+    Exponential,
+    ExponentiallyModifiedGaussian,
+    FromLogDensity,
+    FromNumPyro,
+    Gamma,
+    Gaussian,
+    GaussianMixture,
+    Laplace,
+    LogNormal,
+    Mixture,
+    Singularity,
+    StudentT,
+    TruncatedGaussian,
+    Uniform,
+    bhattacharyya,
+    minimum_error,
+)
 from .priors import DensityPrior, GaussianPrior
 from .registry import explain
 from .report import plot
 from .result import Result, tightest
 from .scenario import Link, Scenario
+from .scoring import Score, score
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
+from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
 
 __version__: str
@@ -33,8 +54,15 @@ __all__ = [
     "DensityPrior",
     "Draws",
     "DwellSight",
+    "Epoch",
     "Estimates",
+    "Exponential",
+    "ExponentiallyModifiedGaussian",
     "FactorisedImmEkf",
+    "Fingerprints",
+    "FromLogDensity",
+    "FromNumPyro",
+    "Gamma",
     "Gaussian",
     "GaussianMixture",
     "GaussianPrior",
@@ -43,10 +71,13 @@ __all__ = [
     "InputError",
     "JumpMarkov",
     "KnownSight",
+    "Laplace",
     "LinearMotion",
     "Link",
     "LocboundsError",
+    "LogNormal",
     "MarkovSight",
+    "Mixture",
     "OracleEkf",
     "PrecisionError",
     "Prior",
@@ -55,11 +86,18 @@ __all__ = [
     "RefusedError",
     "Result",
     "Scenario",
+    "Score",
+    "Singularity",
+    "StudentT",
     "SwitchingMotion",
     "Times",
+    "TruncatedGaussian",
+    "Uniform",
     "bcrb",
     "bcrb_algorithm1",
     "bcrb_block_tridiagonal",
+    "bhattacharyya",
+    "discrete_mmse",
     "enumer",
     "evaluate",
     "explain",
@@ -68,11 +106,17 @@ __all__ = [
     "known_sight",
     "load",
     "los_only",
+    "minimum_error",
     "papers",
     "plot",
     "quantile",
     "read_log",
+    "read_survey",
     "save",
+    "score",
     "simulate",
+    "survey_bound",
+    "survey_model",
+    "testing",
     "tightest",
 ]

@@ -1,6 +1,6 @@
 """Draws of modes, states and measurements from a jump-Markov model."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -33,7 +33,7 @@ class Paths(NamedTuple):
 
 
 @eqx.filter_jit
-def draw_paths(model: JumpMarkov, seed: Array, block: Array, samples: int) -> Paths:
+def draw_paths(model: JumpMarkov, seed: Any, block: Any, samples: int) -> Paths:
     """Independent paths of one block; modes first, then states given modes, then measurements given both."""
     modes = tuple(
         draw_sight(

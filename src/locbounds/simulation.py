@@ -1,7 +1,8 @@
 """Drawing tracks, sight conditions and measurements from a scenario."""
 
+from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -134,7 +135,7 @@ def _draw_block(scenario: Scenario, seed: Array, block: Array, runs: int) -> Dra
 
 
 @eqx.filter_jit
-def _draw_general_block(model: JumpMarkov, seed: Array, block: Array, runs: int) -> Draws:
+def _draw_general_block(model: Any, seed: Any, block: Any, runs: int) -> Draws:
     paths = draw_paths(model, seed, block, runs)
     z = [
         z if channel.reports is None else jnp.where(jnp.asarray(channel.reports)[:, None], z, jnp.nan)
@@ -142,6 +143,32 @@ def _draw_general_block(model: JumpMarkov, seed: Array, block: Array, runs: int)
     ]
     sight = [paths.modes[channel.chain] for channel in model.channels]
     return Draws(jnp.moveaxis(paths.x, 0, 1), *(jnp.moveaxis(jnp.stack(a), (0, 1, 2), (2, 1, 0)) for a in (sight, z)))
+
+
+@double_precision
+def simulate_block(scenario: Scenario | JumpMarkov, *, seed: int, block: int) -> Draws:
+    """One block of :data:`RUNS_PER_BLOCK` tracks of :func:`simulate`: for more runs than fit into memory.
+
+    >>> import locbounds as lb
+    >>> scenario = lb.papers.fritsche2013.scenario(steps=10)
+    >>> few = lb.simulate(scenario, runs=3, seed=1).states
+    >>> bool(np.all(simulate_block(scenario, seed=1, block=0).states[:3] == few))
+    True
+    """
+    return jax.tree.map(np.asarray, _drawing(scenario, seed)(block))
+
+
+def _drawing(scenario: Scenario | JumpMarkov, seed: int) -> Callable[[int], Draws]:
+    """What draws one block."""
+    check_seed(seed)
+    if isinstance(scenario, JumpMarkov) or beyond_separation(scenario):
+        model = scenario if isinstance(scenario, JumpMarkov) else jump_markov(scenario.anonymous())
+        draw: Callable[..., Draws] = _draw_general_block
+    else:
+        for link in scenario.links:
+            link.sight.transitions(scenario.times.intervals)  # raises where chain and times do not fit; jit does not
+        model, draw = scenario.anonymous(), _draw_block
+    return lambda block: draw(model, np.uint32(seed), np.uint32(block), RUNS_PER_BLOCK)
 
 
 @double_precision
@@ -181,15 +208,8 @@ def simulate(scenario: Scenario | JumpMarkov, *, runs: int, seed: int = 0) -> Dr
     """
     if runs < 1 or int(runs) != runs:
         raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 1")
-    check_seed(seed)
-    if isinstance(scenario, JumpMarkov) or beyond_separation(scenario):
-        model = scenario if isinstance(scenario, JumpMarkov) else jump_markov(scenario.anonymous())
-        draw = _draw_general_block
-    else:
-        for link in scenario.links:
-            link.sight.transitions(scenario.times.intervals)  # raises where chain and times do not fit; jit does not
-        model, draw = scenario.anonymous(), _draw_block
-    blocks = [draw(model, np.uint32(seed), np.uint32(b), RUNS_PER_BLOCK) for b in range(-(-runs // RUNS_PER_BLOCK))]
+    draw = _drawing(scenario, seed)
+    blocks = [draw(b) for b in range(-(-runs // RUNS_PER_BLOCK))]
     if traced(scenario):
         return jax.tree.map(lambda *parts: jnp.concatenate(parts)[:runs], *blocks)
     return jax.tree.map(lambda *parts: np.concatenate([np.asarray(part) for part in parts])[:runs], *blocks)

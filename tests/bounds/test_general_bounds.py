@@ -284,3 +284,9 @@ def test_standard_errors_are_the_spread_over_seeds():
     spread = np.std([b.position_mse[-1] for b in bounds], ddof=1)
     claimed = np.sqrt(np.mean([stderr(b) ** 2 for b in bounds]))
     assert 0.55 < spread / claimed < 1.5  # chi^2 with 23 degrees of freedom: false alarm below 1e-3
+
+
+def test_noise_without_information_is_refused_in_any_model():
+    model = switching_model(noises=(lb.Gaussian(0, 1), lb.Uniform(-1, 1)))
+    with pytest.raises(lb.RefusedError, match="channel 0 has no finite Fisher information"):
+        lb.bcrb(model)

@@ -11,9 +11,9 @@ noise. ``X_k = V_k' J_z(k) V_k = Cov(E[T_k | track, noise])`` therefore grows by
 
     X_k = M_k X_{k-1} M_k' + E[xi xi' - c l' - l c' + l (I_k - Var(s_k | w_{1:k})) l'],      l = L_k u_k
 
-with the symbols of :mod:`locbounds.bounds.score_covariance` and one vector per draw and mode, ``b(r) = M_k (E[T_{k-1} |
-r_{k-1} = r] - E[T_{k-1} | r_{k-1} = 0])``, in the place of the differences of all earlier steps: ``xi = sum_r (q - p)(r)
-b(r)``, ``c = sum_r c(r) b(r)``. Nothing is left out, whatever the window: it only chooses V. Work per draw and step is
+with the symbols of :mod:`locbounds.bounds.score_covariance` and one vector per draw and mode,
+``b(r) = M_k (E[T_{k-1} | r_{k-1} = r] - E[T_{k-1} | r_{k-1} = 0])``, in the place of the differences of all earlier
+steps: ``xi = sum_r (q - p)(r) b(r)``, ``c = sum_r c(r) b(r)``. Nothing is left out, whatever the window: it only chooses V. Work per draw and step is
 constant. See docs/theory/score.md.
 """
 
@@ -25,7 +25,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Bool, Float, Int
+from locbounds.axes import Array, Float, Int
 from locbounds.blocks import Stream, block_key
 from locbounds.bounds.expectation import Expectation, Prior
 from locbounds.bounds.recursion import Window, linear_model
@@ -33,8 +33,8 @@ from locbounds.bounds.score_covariance import NoiseProcess, mode_information, no
 from locbounds.linalg import psd_root
 from locbounds.noise import Noise
 from locbounds.scenario import Link, Scenario, alike
-from locbounds.simulation import draw_noise
 from locbounds.sight.draws import next_sight
+from locbounds.simulation import draw_noise
 
 RIDGE = 1e-10  # of the scaled window covariance, which is singular where the motion is
 

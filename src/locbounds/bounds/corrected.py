@@ -101,7 +101,7 @@ def _blocks(scenario, expectation, rtol, samples, seed, window, progress):
 
 
 def corrected(scenario, rtol, samples, seed, expectation, window, progress, why: str) -> Result:
-    """The engine as :func:`locbounds.bcrb` calls it; ``why`` it was chosen goes into the provenance."""
+    """The engine as :func:`locbounds.bcrb` calls it, and ``why`` it was chosen."""
     if traced(scenario, expectation):
         raise InputError("the corrected engine cannot be transformed by JAX", "Use engine='windowed' with a window")
     expectation, verdict = prepare("bcrb", scenario, expectation)
@@ -129,7 +129,7 @@ def bcrb_block_tridiagonal(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Result:
-    """The recursion of Fritsche 2013, section IV: information set to zero beyond neighbouring steps. *Not a bound.*
+    """The recursion of Fritsche 2013, section IV, between neighbouring steps only; not a bound.
 
     What the ranges say about steps that are two or more apart is dropped, and what later ranges add about earlier
     steps too, so that the information matrix is block tridiagonal and a recursion over the last two steps suffices.

@@ -10,6 +10,7 @@ import numpy as np
 
 from locbounds.errors import InputError
 from locbounds.io import build
+from locbounds.io.noise_families import FAMILIES, family_of
 from locbounds.io.schema import (
     DERIVATIVES,
     FORMAT,
@@ -24,7 +25,7 @@ from locbounds.io.schema import (
 )
 from locbounds.measurement import BySight
 from locbounds.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, RandomWalk
-from locbounds.noise import Gaussian, GaussianMixture, Noise
+from locbounds.noise import ExponentiallyModifiedGaussian, Gaussian, GaussianMixture, Mixture, Noise, Sum
 from locbounds.priors import GaussianPrior
 from locbounds.scenario import Link, Scenario
 from locbounds.sight import DwellSight, KnownSight, MarkovSight, Sight
@@ -148,13 +149,29 @@ def sight_keys(sight: Sight, times: Times) -> dict:
 def _noise_table(noise: Noise) -> dict:
     if isinstance(noise, GaussianMixture):
         return {"weights": plain(noise.weights), "means_m": plain(noise.means), "stds_m": plain(noise.stds)}
-    if not isinstance(noise, Gaussian):
+    if isinstance(noise, Sum):
+        return {"sum": [_noise_table(noise.first), _noise_table(noise.second)]}
+    if isinstance(noise, Mixture):
+        shares = zip(plain(noise.weights), noise.parts, strict=True)
+        return {"mixture": [{"share": share, **_noise_table(part)} for share, part in shares]}
+    family = family_of(noise)
+    if family is None:
         raise _cannot(f"the noise {type(noise).__name__}")
-    mean = {"mean_m": plain(noise.mean)} if noise.mean != 0 else {}
-    return {**mean, "std_m": plain(noise.std)}
+    table = {} if family == "gaussian" else {"family": family}
+    for name, argument in FAMILIES[family].keys.items():
+        value = getattr(noise, argument)
+        left_out = name in FAMILIES[family].optional and (value == 0 or not np.isfinite(value))
+        if not left_out or (value == 0 and name in ("low_m", "high_m")):
+            table[name] = plain(value)
+    return table if family != "gaussian" else dict(sorted(table.items()))
 
 
 def _as_excess(los: Noise, nlos: Noise) -> dict | None:
+    if isinstance(nlos, Sum):
+        return {"plus_los": True, **_noise_table(nlos.second)}
+    if isinstance(los, Gaussian) and isinstance(nlos, ExponentiallyModifiedGaussian):
+        start = {"start_m": plain(nlos.center - los.mean)} if nlos.center != los.mean else {}
+        return {"plus_los": True, "family": "exponential", "scale_m": plain(nlos.scale), **start}
     if not isinstance(los, Gaussian) or not isinstance(nlos, Gaussian) or nlos.std <= los.std:
         return None
     mean, std = nlos.mean - los.mean, np.sqrt(nlos.std**2 - los.std**2)

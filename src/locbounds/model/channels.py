@@ -126,7 +126,9 @@ class AdditiveChannel(Channel):
         h, gradient = jax.value_and_grad(lambda x: jnp.reshape(self.h(x, mode, k), ()))(x)
         w = z - h
         root = jnp.sqrt(jnp.asarray(noise.information())) * gradient
-        return Evaluation(noise.log_prob(w), gradient * noise.score(w), root)
+        value = noise.log_prob(w)
+        score = jnp.where(value > -jnp.inf, noise.score(w), 0.0)  # a mode that cannot be has no score
+        return Evaluation(value, gradient * score, root)
 
 
 class DensityChannel(Channel):

@@ -146,8 +146,8 @@ class JumpMarkov(eqx.Module):
         if isinstance(self.motion, DensityMotion):
             motion = self.motion
             for r in range(self.modes(self.motion_chain) if motion.switching else 1):
-                draw = shape("sample of the motion", lambda x, k, r=r: motion.sample(key, x, r, k), x, k)
-                same("sample of the motion", draw, x.shape)
+                drawn = shape("sample of the motion", lambda x, k, r=r: motion.sample(key, x, r, k), x, k)
+                same("sample of the motion", drawn, x.shape)
                 value = shape("log_density of the motion", lambda x, k, r=r: motion.log_density(x, x, r, k), x, k)
                 same("log_density of the motion", value, ())
         for c, channel in enumerate(self.channels):

@@ -6,8 +6,8 @@ import numpy as np
 
 from locbounds.axes import LOS, NLOS
 from locbounds.motion import ConstantAcceleration, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
-from locbounds.noise import Gaussian, Noise
-from locbounds.registry import METHODS
+from locbounds.noise import Gaussian, GaussianMixture, Noise, Sum
+from locbounds.registry import bounds_of
 from locbounds.scenario import Link, Scenario
 from locbounds.sight import DwellSight, KnownSight, MarkovSight, Sight
 from locbounds.verdict import dangers
@@ -39,7 +39,7 @@ def understood(scenario: Scenario) -> dict[str, Any]:
     >>> seen["links"][0]["NLOS error"]
     'mean 513 m, deviation 435.639 m'
     """
-    verdicts = {m.id: m.verdict(scenario) for m in METHODS.values() if m.kind == "bound"}
+    verdicts = {m.id: m.verdict(scenario) for m in bounds_of("scenario")}
     return {
         "title": scenario.title,
         "model": {"time": _time(scenario), "motion": _motion(scenario), "prior": _prior(scenario)},
@@ -152,7 +152,19 @@ def _sight(sight: Sight) -> str:
 
 def _noise(noise: Noise) -> str:
     text = f"mean {_number(noise.mean)} m, deviation {_number(np.sqrt(noise.variance))} m"
-    return text if isinstance(noise, Gaussian) else f"{text}, {len(noise.components()[0])} components"
+    if isinstance(noise, Gaussian):
+        return text
+    if isinstance(noise, GaussianMixture):
+        return f"{text}, {len(noise.weights)} components"
+    return f"{noise_name(noise)}: {text}, {noise.regularity().status}"
+
+
+def noise_name(noise: Noise) -> str:
+    """What a person calls a law."""
+    if isinstance(noise, Sum):
+        return f"{noise_name(noise.first)} + {noise_name(noise.second)}"
+    words = "".join(f" {c.lower()}" if c.isupper() else c for c in type(noise).__name__)
+    return words.strip().replace("gaussian", "Gaussian").replace("laplace", "Laplace").replace("student t", "Student t")
 
 
 def _looks_like_degrees(scenario: Scenario) -> list[str]:

@@ -65,11 +65,21 @@ class MarkovSight(Sight):
             One number for both modes, or (LOS, NLOS).
         start
             Law at step 0; None takes the stationary law.
+
+        Raises
+        ------
+        InputError
+            If ``stay`` is no probability.
         """
         if traced(stay):
             los, nlos = jnp.broadcast_to(jnp.asarray(stay), (2,))
             return cls(start, jnp.array([[los, 1 - los], [1 - nlos, nlos]]))
         los, nlos = np.broadcast_to(float64(stay), (2,))
+        if not (0 <= los <= 1 and 0 <= nlos <= 1):  # NaN too
+            raise InputError(
+                f"the probability of keeping the sight is {stay}",
+                "Give a number from 0 to 1, or one for LOS and one for NLOS; mean seconds are for DwellSight",
+            )
         return cls(start, [[los, 1 - los], [1 - nlos, nlos]])
 
     @classmethod

@@ -87,8 +87,8 @@ def _solve(model: JumpMarkov, what: Frame, linear: LinearModel, tables: Tables, 
     if isinstance(model.prior, DensityPrior):
         P0 = jnp.linalg.inv(tables.prior.mean(0))
         change = -jnp.einsum("ab,gbc,cd->gad", P0, tables.prior - tables.prior.mean(0), P0)
-        P = P.at[0].set(P0)
-        deviations = deviations.at[:, 0].set(change[:, index, index].sum(-1))
+        P = jnp.asarray(P).at[0].set(P0)
+        deviations = jnp.asarray(deviations).at[:, 0].set(change[:, index, index].sum(-1))
     return _Solution(Estimate(P, P[:, index, index].sum(-1), deviations), shorter)
 
 

@@ -5,7 +5,7 @@ Two cases. *The motion has no modes and is linear Gaussian*: its information is 
 modes, which is subtracted from it: the sum is the same for any reference.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -45,14 +45,14 @@ class Frame(NamedTuple):
     parts
         The parts of the model.
     exact
-        Known-mode information beyond the reference's that needs no draws, of every part.
+        Known-mode information beyond the reference's that needs no draws, of every part, [steps, m, m].
     components
         State components that increments are about.
     """
 
     whole: bool
     parts: list[Part]
-    exact: list[Float[Array, "steps m m"]]
+    exact: list[Any]
     reference: Reference | None
     components: tuple[int, ...]
 
@@ -120,14 +120,14 @@ def beyond_reference(
     model: JumpMarkov, frame: Frame, linear: LinearModel, tables: Tables
 ) -> Float[Array, "groups steps ages components ages components"]:
     """The increments less what the linear model has of them."""
-    increments = tables.increments
+    increments = jnp.asarray(tables.increments)
     if frame.reference is None:
         n = model.state_size
         step = jnp.concatenate([jnp.broadcast_to(jnp.eye(n), linear.F.shape), -jnp.asarray(linear.F)], -1)
         own = jnp.einsum("kia,kij,kjb->kab", step, jnp.linalg.inv(linear.Q), step)
         increments = increments.at[:, :, :2, :, :2, :].add(-own.reshape(-1, 2, n, 2, n))
     if isinstance(model.prior, DensityPrior):
-        increments = increments.at[:, 0, 1, :, 1, :].add(tables.prior - jnp.linalg.inv(linear.P0))
+        increments = jnp.asarray(increments).at[:, 0, 1, :, 1, :].add(tables.prior - jnp.linalg.inv(linear.P0))
     return increments
 
 

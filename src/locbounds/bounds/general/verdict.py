@@ -10,8 +10,18 @@ def irregular_noise(model: JumpMarkov) -> str | None:
     for c, channel in enumerate(model.channels):
         for noise in channel.noises if isinstance(channel, AdditiveChannel) else ():
             regularity = noise.regularity()
-            if not regularity.finite:
+            if regularity.finite is False:
                 return f"the noise of channel {c} has no finite Fisher information: {regularity.reason}"
+    return None
+
+
+def undecided_noise(model: JumpMarkov) -> str | None:
+    """Why it cannot be decided whether the Fisher information of some noise exists, or None."""
+    for c, channel in enumerate(model.channels):
+        for noise in channel.noises if isinstance(channel, AdditiveChannel) else ():
+            regularity = noise.regularity()
+            if regularity.finite is None:
+                return f"channel {c}: {regularity.reason}"
     return None
 
 
@@ -40,6 +50,9 @@ def model_verdict(model: JumpMarkov) -> Verdict:
     violated = irregular_noise(model)
     if violated is not None:
         return Verdict(Status.REFUSED, (violated,))
+    doubt = undecided_noise(model)
+    if doubt is not None:
+        return Verdict(Status.UNDECIDED, (doubt, *declared(model)))
     conditions = declared(model)
     if conditions:
         return Verdict(Status.CONDITIONAL, conditions)
