@@ -21,8 +21,8 @@ def sight_from_uniforms(
 
 
 def next_sight(
-    transition: Float[Array, "before modes"], sight: Int[Array, " runs"], u: Float[Array, " runs"]
-) -> Int[Array, " runs"]:
+    transition: Float[Array, "before modes"], sight: Int[Array, "*runs"], u: Float[Array, "*runs"]
+) -> Int[Array, "*runs"]:
     """Sight one step later from uniform numbers, by inverse distribution functions.
 
     >>> next_sight(jnp.array([[0.9, 0.1], [0.2, 0.8]]), jnp.array([0, 0, 1]), jnp.array([0.5, 0.95, 0.1])).tolist()
