@@ -1,9 +1,9 @@
 # The public names: what type checkers see, and what is imported on first use (lazy-loader reads this file).
 from . import papers
-from .bounds import AlongTrack, Prior, bcrb, bcrb_algorithm1, enumer, known_sight, los_only
+from .bounds import AlongTrack, Gaussians, Prior, bcrb, bcrb_algorithm1, enumer, known_sight, los_only
 from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
-from .filters import Estimates, FactorisedImmEkf, ImmEkf, ImmKf, OracleEkf
+from .filters import EkfBanks, Estimates, FactorisedImmEkf, ImmEkf, ImmKf, ImmKfSmoother, OracleEkf, Rbpf
 from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
@@ -25,13 +25,16 @@ __all__ = [
     "ConstantVelocity",
     "Draws",
     "DwellSight",
+    "EkfBanks",
     "Estimates",
     "FactorisedImmEkf",
     "Gaussian",
     "GaussianMixture",
     "GaussianPrior",
+    "Gaussians",
     "ImmEkf",
     "ImmKf",
+    "ImmKfSmoother",
     "InputError",
     "KnownSight",
     "Link",
@@ -41,6 +44,7 @@ __all__ = [
     "PrecisionError",
     "Prior",
     "Range",
+    "Rbpf",
     "RefusedError",
     "Result",
     "Scenario",

@@ -4,5 +4,16 @@ from locbounds.bounds.algorithm1 import bcrb_algorithm1
 from locbounds.bounds.bcrb import bcrb, known_sight
 from locbounds.bounds.conditional import enumer, los_only
 from locbounds.bounds.expectation import AlongTrack, Expectation, Prior
+from locbounds.bounds.gaussians import Gaussians
 
-__all__ = ["AlongTrack", "Expectation", "Prior", "bcrb", "bcrb_algorithm1", "enumer", "known_sight", "los_only"]
+__all__ = [
+    "AlongTrack",
+    "Expectation",
+    "Gaussians",
+    "Prior",
+    "bcrb",
+    "bcrb_algorithm1",
+    "enumer",
+    "known_sight",
+    "los_only",
+]

@@ -4,13 +4,21 @@ from typing import Annotated
 
 import typer
 
-from locbounds.cli.options import ForceOption, JsonOption, OutOption, SeedOption, default_out
+from locbounds.cli.options import (
+    ForceOption,
+    JsonOption,
+    OutOption,
+    RequirementOption,
+    SeedOption,
+    default_out,
+    requirements,
+)
 from locbounds.cli.output import output_folder, print_json, print_table, status
 from locbounds.cli.paper_names import paper as find_paper
 
 
 def paper(
-    name: Annotated[str, typer.Argument(metavar="PAPER", help="fritsche2013", show_default=False)],
+    name: Annotated[str, typer.Argument(metavar="PAPER", help="chen2010 or fritsche2013", show_default=False)],
     samples: Annotated[
         int | None,
         typer.Option(
@@ -19,7 +27,15 @@ def paper(
             help="Draws of every bound, in blocks of 2048; by default until the s.e. is below 0.1 %.",
         ),
     ] = None,
-    runs: Annotated[int, typer.Option("--runs", min=2, help="Tracks for every filter (the paper: 20,000).")] = 10_000,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            "--runs",
+            min=2,
+            help="Tracks for every filter; by default 10,000 (the paper: 20,000), for chen2010 400 (the paper: 50).",
+        ),
+    ] = None,
+    requirement: RequirementOption = "e911",
     seed: SeedOption = 0,
     out: OutOption = None,
     json: JsonOption = False,
@@ -28,25 +44,38 @@ def paper(
     """Reproduce a paper: its tables and figures, published beside computed with standard errors.
 
     Writes table1.csv, fig1.csv and fig1.png for fritsche2013; after Ctrl-C the finished columns of Table I. The
-    table on the screen compares every published entry with the computed one.
+    table on the screen compares every published entry with the computed one. For chen2010: fig1 and fig2 (csv, png),
+    quantiles.csv, segments.csv, settings.csv, bounds.csv, requirement.csv, and which of its statements hold.
 
     [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
     """
-    study = find_paper(name)
+    find_paper(name)
+    wanted = requirements(requirement)
     with output_folder(default_out(name, out), force=force) as folder:
-        columns = []
-        try:
-            with status(f"{name}: starting") as say:
-                columns.extend(study.study(samples=samples, runs=runs, seed=seed, announce=say))
-        except KeyboardInterrupt:
-            if columns:
-                folder.write_text("table1.csv", study.table1_csv(columns))
-            raise
-        cells = study.table1(columns)
-        folder.write_text("table1.csv", study.table1_csv(columns))
-        folder.write_text("fig1.csv", study.fig1_csv(columns))
-        figure = study.fig1(columns)
-        folder.write("fig1.png", lambda path: figure.savefig(path, dpi=150))
+        if name == "chen2010":
+            from locbounds.cli.paper_chen2010 import chen2010
+
+            chen2010(folder, runs=runs, seed=seed, wanted=wanted, json=json)
+        else:
+            _fritsche2013(folder, samples, 10_000 if runs is None else runs, seed, json)
+
+
+def _fritsche2013(folder, samples: int | None, runs: int, seed: int, json: bool) -> None:
+    from locbounds.papers import fritsche2013 as study
+
+    columns = []
+    try:
+        with status("fritsche2013: starting") as say:
+            columns.extend(study.study(samples=samples, runs=runs, seed=seed, announce=say))
+    except KeyboardInterrupt:
+        if columns:
+            folder.write_text("table1.csv", study.table1_csv(columns))
+        raise
+    cells = study.table1(columns)
+    folder.write_text("table1.csv", study.table1_csv(columns))
+    folder.write_text("fig1.csv", study.fig1_csv(columns))
+    figure = study.fig1(columns)
+    folder.write("fig1.png", lambda path: figure.savefig(path, dpi=150))
     if json:
         print_json({"table1": [cell._asdict() for cell in cells], "remarks": study.REMARKS})
         return
