@@ -5,6 +5,8 @@ PY     := $(VENV)/bin/python
 PINS   := constraints.txt
 PIP    := $(PY) -m pip --disable-pip-version-check --quiet install --constraint $(PINS)
 
+PARALLEL := --numprocesses auto --dist loadfile  # a test file per core
+
 # A stamp is written when its step is complete, so that an interrupted set-up starts again.
 RUN   := $(VENV)/.stamp-run
 TEST  := $(VENV)/.stamp-test
@@ -28,10 +30,10 @@ test: $(TEST) ## format, types, layers and tests (what .ci/run calls)
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m pyright
-	$(PY) -m pytest
+	$(PY) -m pytest $(PARALLEL)
 
 test-all: test ## the same, then the slow tests
-	$(PY) -m pytest -m slow
+	$(PY) -m pytest -m slow $(PARALLEL)
 
 bench: $(BENCH) ## speed, side by side with today's alternatives
 	$(PY) -m benchmarks

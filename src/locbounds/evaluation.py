@@ -110,8 +110,17 @@ def evaluate_on(
             progress(min(start + RUNS_AT_ONCE, runs), runs)
     error = np.concatenate(errors)
     consistency = np.concatenate(nees) if nees else None
-    of_filter = {key: np.concatenate(parts) for key, parts in diagnostics.items()}
-    return score(filter, scenario, error, covariance, consistency, seed=seed, name=name, diagnostics=of_filter)
+    return result_of_errors(
+        error,
+        scenario.times.time_s,
+        covariance,
+        consistency,
+        filter=filter,
+        name=name,
+        seed=seed,
+        how="tracks drawn from the model",
+        diagnostics={key: np.concatenate(parts) for key, parts in diagnostics.items()},
+    )
 
 
 def estimates(
@@ -166,26 +175,29 @@ def normalised_square(error: Array, covariance: Array) -> Float[Array, "runs tim
     return np.einsum("...i,...i->...", e, np.linalg.solve(correlation, e[..., None])[..., 0]) / n
 
 
-def score(
-    filter: Any,
-    scenario: Scenario,
+def result_of_errors(
     error: Float[Array, "runs times"],
+    time_s: Float[Array, " times"],
     covariance: Float[Array, "times state state"],
     consistency: Float[Array, "runs times"] | None,
     *,
+    filter: Any = None,
+    name: str | None = None,
+    sees: frozenset[str] = RANGES,
     seed: int,
-    name: str | None,
-    track: str = "",
+    how: str,
+    warnings: tuple[str, ...] = (),
     diagnostics: dict[str, Any] | None = None,
 ) -> Result:
-    """The result of a filter from its position errors."""
+    """The result of a filter from its position errors; ``filter`` lends its id, name and what it sees."""
     runs = len(error)
     groups = min(GROUPS, runs)
     square = error**2
     group_means = np.stack([part.mean(0) for part in np.array_split(square, groups)])
     mean, spread = square.mean(0), np.asarray(deviations(group_means)[1])
     lost = int(np.sum(~(error[:, -1] <= DIVERGED * np.median(error[:, -1]))))
-    warnings = (f"{lost} of {runs} runs were lost: their errors count fully",) if lost else ()
+    if lost:
+        warnings = (f"{lost} of {runs} runs were lost: their errors count fully", *warnings)
     id = getattr(filter, "id", "own")
     diagnostics = (diagnostics or {}) | {"error_m": error, "lost": np.int64(lost)}
     if consistency is not None:
@@ -194,16 +206,13 @@ def score(
         id=id,
         name=name or getattr(filter, "name", None) or getattr(filter, "__name__", "own filter"),
         kind="filter",
-        sees=getattr(filter, "sees", RANGES),
-        time_s=scenario.times.time_s,
+        sees=getattr(filter, "sees", sees),
+        time_s=time_s,
         position_mse=mean,
         replicates=np.asarray(spread),
         covariance=covariance,
         verdict=Verdict(Status.VALID, (), warnings),
-        provenance=Provenance.now(
-            seed, runs, "tracks drawn from the model", METHODS[id].references if id in METHODS else ()
-        ),
-        track=track,
+        provenance=Provenance.now(seed, runs, how, METHODS[id].references if id in METHODS else ()),
         diagnostics=diagnostics,
     )
 

@@ -6,14 +6,25 @@ Docs tables, ``locbounds explain``, verdicts and the command line's choices are 
 import importlib
 from typing import Any, NamedTuple
 
+from locbounds.assumptions import COMMON
 from locbounds.errors import InputError
 from locbounds.scenario import Scenario
-from locbounds.verdict import KNOWN_SIGHT, LOS_AND_NLOS, SMOOTH_NOISE, Assumption, Verdict, judge
+from locbounds.verdict import (
+    KNOWN_SIGHT,
+    LOS_AND_NLOS,
+    SEPARABLE,
+    SMOOTH_NOISE,
+    SURVEYED,
+    Assumption,
+    Verdict,
+    judge,
+)
 
 RANGES = frozenset({"ranges"})
 RANGES_AND_SIGHT = frozenset({"ranges", "sight"})
 PAST_AND_FUTURE_RANGES = frozenset({"ranges", "future-ranges"})
 LOS_RANGES_AND_SIGHT = frozenset({"los-ranges", "sight"})
+FINGERPRINT = frozenset({"fingerprint"})
 
 
 class Method(NamedTuple):
@@ -36,9 +47,11 @@ class Method(NamedTuple):
     references
         Citation keys of docs/references.bib.
     assumptions
-        Predicates on a scenario.
+        Predicates on what it speaks of.
     conditions
         Under which condition it is valid at all.
+    subject
+        What it speaks of: a ``"scenario"`` or a ``"survey"``.
     """
 
     id: str
@@ -52,10 +65,15 @@ class Method(NamedTuple):
     references: tuple[str, ...]
     assumptions: tuple[Assumption, ...] = ()
     conditions: tuple[str, ...] = ()
+    subject: str = "scenario"
 
-    def verdict(self, scenario: Scenario, conditions: tuple[str, ...] = ()) -> Verdict:
-        """Whether it applies to a scenario."""
-        return judge(self.assumptions, scenario, grounds=self.grounds, conditions=self.conditions + conditions)
+    def verdict(self, subject: Any, conditions: tuple[str, ...] = ()) -> Verdict:
+        """Whether it applies to a scenario (or to a survey model)."""
+        return judge(self.assumptions, subject, grounds=self.grounds, conditions=self.conditions + conditions)
+
+    def check(self, scenario: Scenario) -> list[tuple[str, str | None]]:
+        """Every assumption in words, and why a scenario violates it (None where it does not)."""
+        return [(a.text, a.violated(scenario)) for a in self.assumptions]
 
 
 METHODS: dict[str, Method] = {
@@ -73,7 +91,7 @@ METHODS: dict[str, Method] = {
             "Not a bound for filters that are told the sight, nor for the error along one fixed track; optimistic when "
             "real errors are correlated in time beyond the chain.",
             ("fritsche2013", "louis1982"),
-            (SMOOTH_NOISE,),
+            (*COMMON, SMOOTH_NOISE),
         ),
         Method(
             "enumer",
@@ -87,7 +105,7 @@ METHODS: dict[str, Method] = {
             "Ignores that the sight has to be inferred, hence often loose; neither always above nor always below the "
             "BCRB.",
             ("hernandez2005", "fritsche2013"),
-            (SMOOTH_NOISE,),
+            (*COMMON, SMOOTH_NOISE, SEPARABLE),
         ),
         Method(
             "known-sight",
@@ -100,7 +118,7 @@ METHODS: dict[str, Method] = {
             "Needs the schedule; along one given track it is a conditional number that bounds no error over random "
             "tracks.",
             ("chen2010", "tichavsky1998"),
-            (SMOOTH_NOISE, KNOWN_SIGHT),
+            (*COMMON, SMOOTH_NOISE, KNOWN_SIGHT, SEPARABLE),
         ),
         Method(
             "los-only",
@@ -112,8 +130,27 @@ METHODS: dict[str, Method] = {
             (),
             "Not a bound for filters that use NLOS ranges; right where the NLOS excess is unknown and arbitrary.",
             ("qi2006",),
-            (SMOOTH_NOISE, LOS_AND_NLOS),
+            (*COMMON, SMOOTH_NOISE, LOS_AND_NLOS, SEPARABLE),
             ("estimators that discard NLOS ranges, or an NLOS excess about which nothing is known",),
+        ),
+        Method(
+            "survey",
+            "Survey bound",
+            "bound",
+            "Discrete Ziv-Zakai bound of a fingerprint survey: no estimator that sees one fingerprint has a smaller "
+            "mean square error over the surveyed points.",
+            FINGERPRINT,
+            "locbounds.survey:survey_bound",
+            (),
+            "Goes to zero with the noise, while the error between surveyed points does not; a survey of few noisy "
+            "samples makes points look more different than they are.",
+            ("mcguire2009", "bell1997"),
+            (SURVEYED,),
+            (
+                "a device at one of the surveyed points, all equally likely",
+                "Gaussian noise, the same everywhere, around the mean fingerprints of the survey",
+            ),
+            "survey",
         ),
         Method(
             "imm-ekf",
@@ -201,6 +238,32 @@ METHODS: dict[str, Method] = {
 }
 
 
+TOPICS: dict[str, str] = {
+    "regularity": """Regularity (regularity), when a Cramér-Rao bound exists
+All Cramér-Rao bounds need a noise whose Fisher information about a shift, E[score^2], is finite. That is so exactly
+where the root of the density has a square integrable derivative. Near a place x0, with t the distance from it:
+
+jump     p is not continuous (uniform, exponential, cut laws)             infinite
+edge     p ~ t^a at an end of the support, or at a zero inside            finite only for a > 1
+pole     p ~ t^a with a < 0                                               infinite
+cusp     p(x0) > 0 and p changes like t^b                                 finite only for b > 1/2
+kink     p(x0) > 0 and its slope jumps (Laplace)                          finite, but only as E[score^2]
+
+A sum of independent noises has no more information than each of them, so that any excess on top of Gaussian noise is
+regular. Exponents of a sum follow from those of its parts, a + b + 1: the sum of two cut laws (jumps, a = 0) vanishes
+linearly at its ends, and has no finite information either.
+
+Where the information is infinite the bound is zero, and a Monte Carlo value grows with the logarithm of the number of
+draws: bounds are refused, and the verdict names place and exponent. Weiss-Weinstein and Ziv-Zakai bounds apply.
+A law given as a function is examined: regular, irregular, or undecided. An undecided bound may be computed, but is
+never called valid nor compared with; declare the singularities of the density to decide it.
+
+see      locbounds check scenario.toml, which prints the verdict for every bound
+cite     hajek1972, ibragimov1981, stam1959, weiss1985""",
+}
+"""What ``explain`` tells beside the methods."""
+
+
 def method(id: str, kind: str | None = None) -> Method:
     """The entry of an id, or an InputError with the nearest known id.
 
@@ -216,6 +279,15 @@ def method(id: str, kind: str | None = None) -> Method:
     near = difflib.get_close_matches(id, [m.id for m in known], n=1, cutoff=0.4)
     hint = f"Did you mean {near[0]}? " if near else ""
     raise InputError(f"unknown {kind or 'method'} {id!r}", f"{hint}Known: {', '.join(m.id for m in known)}")
+
+
+def bounds_of(subject: str) -> list[Method]:
+    """The bounds that speak of a scenario, or of a survey.
+
+    >>> [m.id for m in bounds_of("survey")]
+    ['survey']
+    """
+    return [m for m in METHODS.values() if m.kind == "bound" and m.subject == subject]
 
 
 def load(entry: Method) -> Any:
@@ -246,13 +318,15 @@ def describe(entry: Method) -> dict[str, Any]:
     }
 
 
-def explain(id: str) -> str:
-    """What a bound or filter assumes, when it misleads, and whom to cite.
+def explain(id: str, scenario: Scenario | None = None) -> str:
+    """What a bound or filter assumes, when it misleads, and whom to cite; made from the table of methods.
 
     Parameters
     ----------
     id
-        Id of a method, for example ``bcrb``.
+        Id of a method, for example ``bcrb``, or the topic ``regularity``.
+    scenario
+        If given, every assumption is checked for it, and the verdict added.
 
     Raises
     ------
@@ -263,8 +337,19 @@ def explain(id: str) -> str:
     --------
     >>> print(explain("bcrb").splitlines()[0])
     BCRB (bcrb), a bound
+    >>> import locbounds as lb
+    >>> print(explain("known-sight", lb.papers.fritsche2013.scenario()).splitlines()[-2][:60])
+    violated the sight of every link is known at every step: the
     """
+    if id in TOPICS:
+        return TOPICS[id]
     entry = describe(method(id))
     lines = [f"{entry['name']} ({entry['id']}), a {entry['kind']}", entry["summary"], ""]
     lines += [f"sees     {', '.join(entry['sees'])}", *(f"assumes  {text}" for text in entry["assumes"])]
-    return "\n".join([*lines, f"careful  {entry['fails']}", f"cite     {', '.join(entry['cite'])}"])
+    lines += [f"careful  {entry['fails']}", f"cite     {', '.join(entry['cite'])}"]
+    if scenario is not None:
+        lines += ["", f"for      {scenario.title or 'this scenario'}"]
+        checks = method(id).check(scenario)
+        lines += [f"violated {text}: {why}" if why else f"holds    {text}" for text, why in checks]
+        lines += [f"verdict  {method(id).verdict(scenario)}"]
+    return "\n".join(lines)

@@ -174,8 +174,9 @@ class Result(eqx.Module):
                 f"{self.track or 'random tracks'}",
                 "A Bayesian bound holds over tracks drawn from the model: compare like with like",
             )
-        if bound.verdict.status is Status.REFUSED:
-            raise RefusedError(f"{bound.name} was refused: {bound.verdict}", "Choose a bound that applies")
+        if bound.verdict.status in (Status.REFUSED, Status.UNDECIDED):
+            said = "was refused" if bound.verdict.status is Status.REFUSED else "is not known to be a bound"
+            raise RefusedError(f"{bound.name} {said}: {bound.verdict}", "Choose a bound that applies")
         if not np.array_equal(self.time_s, bound.time_s):
             raise RefusedError("the time steps of filter and bound differ", "Compute both on one scenario")
         log_ratio = float(np.log(np.mean(bound.position_mse) / np.mean(self.position_mse)))

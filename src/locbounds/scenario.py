@@ -1,5 +1,6 @@
 """A scenario: what is located, from what, with which prior knowledge."""
 
+import dataclasses
 from typing import Any
 
 import equinox as eqx
@@ -9,12 +10,20 @@ import numpy as np
 
 from locbounds.axes import Array, Bool, Float
 from locbounds.errors import InputError
-from locbounds.measurement import Range
-from locbounds.motion import Motion
+from locbounds.measurement import BySight, Range
+from locbounds.motion import Motion, SwitchingMotion
 from locbounds.noise import Noise
+from locbounds.precision import traced
 from locbounds.priors import GaussianPrior
 from locbounds.sight import KnownSight, Sight
 from locbounds.times import Times
+
+
+def _equal(a: Sight, b: Sight) -> bool:
+    """Whether two chains are the same, leaf by leaf; traced ones are taken to be."""
+    (leaves_a, tree_a), (leaves_b, tree_b) = jax.tree.flatten(a), jax.tree.flatten(b)
+    same = zip(leaves_a, leaves_b, strict=False)
+    return tree_a == tree_b and (traced(a, b) or all(np.array_equal(x, y) for x, y in same))
 
 
 class Link(eqx.Module):
@@ -25,13 +34,15 @@ class Link(eqx.Module):
     name
         Name of the anchor.
     measurement
-        What is measured: ``h(position)``.
+        What is measured: ``h(position)``, or one such measurement per sight condition (:class:`BySight`).
     sight
         The chain of sight conditions.
     noises
-        One noise per sight condition, (LOS, NLOS).
+        One noise per sight condition, (LOS, NLOS), or more.
     reports
         Which of the steps 1..K have a measurement, [steps]; None means all.
+    chain
+        Name of the chain. Links with the same chain name switch together; None: a chain of its own.
 
     Examples
     --------
@@ -41,10 +52,15 @@ class Link(eqx.Module):
     """
 
     name: str = eqx.field(static=True)
-    measurement: Range
+    measurement: Range | BySight
     sight: Sight
     noises: tuple[Noise, ...]
     reports: Bool[Array, " steps"] | None = None
+    chain: str | None = eqx.field(static=True, default=None)
+
+    def replace(self, **changes) -> "Link":
+        """A copy with some fields changed."""
+        return dataclasses.replace(self, **changes)
 
 
 def alike(links: tuple[Link, ...]) -> list[tuple[np.ndarray, Link]]:
@@ -83,7 +99,8 @@ class Scenario(eqx.Module):
     prior
         Law of the state at step 0.
     links
-        The links to the anchors. Their chains, noises and starts are independent of each other.
+        The links to the anchors. Their noises are independent of each other, and so are their chains, unless links
+        (and a switching motion) name one chain in common.
 
     Raises
     ------
@@ -127,12 +144,28 @@ class Scenario(eqx.Module):
                     f"anchor {link.name} has {len(link.noises)} noises for {len(link.sight.start)} sight conditions",
                     "Give one noise per sight condition",
                 )
+            of = link.measurement
+            if isinstance(of, BySight) and len(of.measurements) != len(link.noises):
+                raise InputError(
+                    f"anchor {link.name} has {len(of.measurements)} measurements, {len(link.noises)} sight conditions",
+                    "Give one measurement per sight condition",
+                )
             if link.reports is not None and np.shape(link.reports) != (self.steps,):
                 raise InputError(
                     f"anchor {link.name} says for {np.shape(link.reports)[0]} steps whether it reported, "
                     f"the scenario has {self.steps}",
                     "Give one truth value per step 1..K",
                 )
+        named = [(link.chain, link.sight, link.name) for link in self.links]
+        if isinstance(self.motion, SwitchingMotion):
+            named.append((self.motion.chain, self.motion.sight, "motion"))
+        for i, (chain, sight, name) in enumerate(named):
+            for other, other_sight, other_name in named[:i]:
+                if chain is not None and chain == other and not _equal(sight, other_sight):
+                    raise InputError(
+                        f"{other_name} and {name} name the same chain {chain}, but their sights differ",
+                        "Give both the same sight, or chains of their own",
+                    )
 
     @property
     def steps(self) -> int:
@@ -159,12 +192,12 @@ class Scenario(eqx.Module):
     @property
     def transition(self) -> Float[Array, "steps state state"]:
         """F of every step."""
-        return jax.vmap(self.motion.transition)(jnp.asarray(self.times.intervals))
+        return self.motion.transitions(self.times.intervals)
 
     @property
     def process_noise(self) -> Float[Array, "steps state state"]:
         """Q of every step."""
-        return jax.vmap(self.motion.covariance)(jnp.asarray(self.times.intervals))
+        return self.motion.covariances(self.times.intervals)
 
     def replace(self, **changes) -> "Scenario":
         """A copy with some fields changed; all checks run again."""
@@ -178,19 +211,16 @@ class Scenario(eqx.Module):
         >>> lb.papers.fritsche2013.scenario().anonymous().links[2].name
         '2'
         """
-        links = [Link(str(m), a.measurement, a.sight, a.noises, a.reports) for m, a in enumerate(self.links)]
-        return self.replace(title="", links=links)
+        return self.replace(title="", links=[a.replace(name=str(m)) for m, a in enumerate(self.links)])
 
     def with_times(self, time_s: Float[Array, " times"]) -> "Scenario":
         """The same scenario at other times; which steps had reports is forgotten."""
-        links = [Link(a.name, a.measurement, a.sight, a.noises) for a in self.links]
-        return self.replace(times=Times(time_s), links=links)
+        return self.replace(times=Times(time_s), links=[a.replace(reports=None) for a in self.links])
 
     def with_reports(self, reports: Bool[Array, "steps links"]) -> "Scenario":
         """The same scenario with a mask of the measurements that exist."""
         reports = np.asarray(reports, dtype=bool)
-        links = [Link(a.name, a.measurement, a.sight, a.noises, reports[:, m]) for m, a in enumerate(self.links)]
-        return self.replace(links=links)
+        return self.replace(links=[a.replace(reports=reports[:, m]) for m, a in enumerate(self.links)])
 
     def with_known_sight(self, modes: Any) -> "Scenario":
         """The same scenario with a known sight schedule.
@@ -226,7 +256,26 @@ class Scenario(eqx.Module):
                 f"Give one sight per step 1..K: [{self.steps}], or [{self.steps}, {len(names)}], a column per anchor",
             )
         modes = np.broadcast_to(modes[:, None] if modes.ndim == 1 else modes, (len(modes), len(names)))
-        links = [
-            Link(a.name, a.measurement, KnownSight(modes[:, m]), a.noises, a.reports) for m, a in enumerate(self.links)
-        ]
+        links = [a.replace(sight=KnownSight(modes[:, m], len(a.noises)), chain=None) for m, a in enumerate(self.links)]
         return self.replace(links=links)
+
+
+def beyond_separation(scenario: Scenario) -> str | None:
+    """Why noise and geometry of a scenario do not separate link by link, or None where they do.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> beyond_separation(lb.papers.fritsche2013.scenario()) is None
+    True
+    """
+    if isinstance(scenario.motion, SwitchingMotion):
+        return "the motion switches"
+    by_sight = [link.name for link in scenario.links if isinstance(link.measurement, BySight)]
+    if by_sight:
+        return f"what anchor {', '.join(by_sight)} measures depends on the sight"
+    chains = [link.chain for link in scenario.links if link.chain is not None]
+    shared = [link.name for link in scenario.links if link.chain is not None and chains.count(link.chain) > 1]
+    if shared:
+        return f"anchors {', '.join(shared)} share a chain"
+    return None

@@ -1,8 +1,10 @@
 """Drawing tracks, sight conditions and measurements from a scenario."""
 
+from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,11 +13,26 @@ from locbounds.axes import Array, Float, Int
 from locbounds.blocks import Stream, block_key, check_seed
 from locbounds.errors import InputError
 from locbounds.linalg import psd_root
+from locbounds.model import JumpMarkov, jump_markov
+from locbounds.motion import SwitchingMotion
 from locbounds.noise import Noise
+from locbounds.paths import draw_paths, moving_states
 from locbounds.precision import double_precision, traced
-from locbounds.scenario import Link, Scenario, alike
+from locbounds.scenario import Link, Scenario, alike, beyond_separation
+from locbounds.sight.draws import draw_sight, sight_from_uniforms
 
 RUNS_PER_BLOCK = 1024
+
+__all__ = [
+    "Draws",
+    "draw_noise",
+    "draw_sight",
+    "draw_states",
+    "equal_weights",
+    "likelihood_ratios",
+    "sight_from_uniforms",
+    "simulate",
+]
 
 
 class Draws(NamedTuple):
@@ -44,6 +61,11 @@ class Draws(NamedTuple):
 
 def draw_states(key: Array, scenario: Scenario, runs: int) -> Float[Array, "runs times state"]:
     """Tracks from the prior and the motion model; differentiable in both."""
+    if isinstance(scenario.motion, SwitchingMotion):
+        chain = scenario.motion.sight
+        transitions = chain.transitions(scenario.times.intervals)
+        modes = draw_sight(jax.random.fold_in(key, 1), jnp.asarray(chain.start), transitions, runs)
+        return jnp.moveaxis(moving_states(key, jump_markov(scenario), modes, runs), 0, 1)
     first, driving = jax.random.split(key)
     n = scenario.motion.state_size
     x0 = scenario.prior.mean + jax.random.normal(first, (runs, n)) @ psd_root(jnp.asarray(scenario.prior.covariance))
@@ -57,29 +79,6 @@ def draw_states(key: Array, scenario: Scenario, runs: int) -> Float[Array, "runs
 
     _, later = jax.lax.scan(step, x0, (scenario.transition, v))
     return jnp.concatenate([x0[:, None], jnp.moveaxis(later, 0, 1)], axis=1)
-
-
-def sight_from_uniforms(
-    start: Float[Array, " modes"], transitions: Float[Array, "steps modes modes"], u: Float[Array, "times runs"]
-) -> Int[Array, "steps runs"]:
-    """Sight of one link at steps 1..K from uniform numbers at steps 0..K, by inverse distribution functions."""
-
-    def pick(law, u):  # inverse distribution function; law [..., modes]
-        return jnp.sum(u[..., None] >= jnp.cumsum(law, -1)[..., :-1], -1)
-
-    def step(r, piece):
-        T, u = piece
-        r = pick(T[r], u)
-        return r, r
-
-    return jax.lax.scan(step, pick(jnp.asarray(start), u[0]), (transitions, u[1:]))[1]
-
-
-def draw_sight(
-    key: Array, start: Float[Array, " modes"], transitions: Float[Array, "steps modes modes"], runs: int
-) -> Int[Array, "steps runs"]:
-    """Sight of one link at steps 1..K; the chain starts at step 0."""
-    return sight_from_uniforms(start, transitions, jax.random.uniform(key, (len(transitions) + 1, runs)))
 
 
 def likelihood_ratios(
@@ -135,14 +134,52 @@ def _draw_block(scenario: Scenario, seed: Array, block: Array, runs: int) -> Dra
     return Draws(states, sight, measurements)
 
 
+@eqx.filter_jit
+def _draw_general_block(model: Any, seed: Any, block: Any, runs: int) -> Draws:
+    paths = draw_paths(model, seed, block, runs)
+    z = [
+        z if channel.reports is None else jnp.where(jnp.asarray(channel.reports)[:, None], z, jnp.nan)
+        for channel, z in zip(model.channels, paths.z, strict=True)
+    ]
+    sight = [paths.modes[channel.chain] for channel in model.channels]
+    return Draws(jnp.moveaxis(paths.x, 0, 1), *(jnp.moveaxis(jnp.stack(a), (0, 1, 2), (2, 1, 0)) for a in (sight, z)))
+
+
 @double_precision
-def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
+def simulate_block(scenario: Scenario | JumpMarkov, *, seed: int, block: int) -> Draws:
+    """One block of :data:`RUNS_PER_BLOCK` tracks of :func:`simulate`: for more runs than fit into memory.
+
+    >>> import locbounds as lb
+    >>> scenario = lb.papers.fritsche2013.scenario(steps=10)
+    >>> few = lb.simulate(scenario, runs=3, seed=1).states
+    >>> bool(np.all(simulate_block(scenario, seed=1, block=0).states[:3] == few))
+    True
+    """
+    return jax.tree.map(np.asarray, _drawing(scenario, seed)(block))
+
+
+def _drawing(scenario: Scenario | JumpMarkov, seed: int) -> Callable[[int], Draws]:
+    """What draws one block."""
+    check_seed(seed)
+    if isinstance(scenario, JumpMarkov) or beyond_separation(scenario):
+        model = scenario if isinstance(scenario, JumpMarkov) else jump_markov(scenario.anonymous())
+        draw: Callable[..., Draws] = _draw_general_block
+    else:
+        for link in scenario.links:
+            link.sight.transitions(scenario.times.intervals)  # raises where chain and times do not fit; jit does not
+        model, draw = scenario.anonymous(), _draw_block
+    return lambda block: draw(model, np.uint32(seed), np.uint32(block), RUNS_PER_BLOCK)
+
+
+@double_precision
+def simulate(scenario: Scenario | JumpMarkov, *, runs: int, seed: int = 0) -> Draws:
     """Draw tracks, sight conditions and measurements.
 
     Parameters
     ----------
     scenario
-        What to draw from.
+        What to draw from. Of a :class:`~locbounds.JumpMarkov`, whose measurements must be numbers, channels take
+        the place of links.
     runs
         Number of tracks, at least 1. The first tracks are the same for any number.
     seed
@@ -171,13 +208,8 @@ def simulate(scenario: Scenario, *, runs: int, seed: int = 0) -> Draws:
     """
     if runs < 1 or int(runs) != runs:
         raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 1")
-    check_seed(seed)
-    for link in scenario.links:
-        link.sight.transitions(scenario.times.intervals)  # raises where chain and times do not fit, as jit does not
-    model = scenario.anonymous()
-    blocks = [
-        _draw_block(model, np.uint32(seed), np.uint32(b), RUNS_PER_BLOCK) for b in range(-(-runs // RUNS_PER_BLOCK))
-    ]
+    draw = _drawing(scenario, seed)
+    blocks = [draw(b) for b in range(-(-runs // RUNS_PER_BLOCK))]
     if traced(scenario):
         return jax.tree.map(lambda *parts: jnp.concatenate(parts)[:runs], *blocks)
     return jax.tree.map(lambda *parts: np.concatenate([np.asarray(part) for part in parts])[:runs], *blocks)

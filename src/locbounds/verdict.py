@@ -2,13 +2,13 @@
 
 from collections.abc import Callable
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from locbounds.axes import LOS, NLOS
 from locbounds.precision import double_precision, traced
-from locbounds.scenario import Scenario
+from locbounds.scenario import Scenario, beyond_separation
 from locbounds.sight import DwellSight, KnownSight, MarkovSight
 
 NEARLY_CERTAIN = 1e-3  # a chain that changes (or keeps) its mode less often than this per step is called deterministic
@@ -20,6 +20,7 @@ class Status(StrEnum):
 
     VALID = "valid"
     CONDITIONAL = "valid under"
+    UNDECIDED = "undecided"
     REFUSED = "refused"
 
 
@@ -31,11 +32,14 @@ class Assumption(NamedTuple):
     text
         What is assumed, in words.
     violated
-        Predicate: the reason why a scenario violates it, or None.
+        Predicate: the reason why a scenario (or a survey) violates it, or None.
+    doubtful
+        Predicate: the reason why it cannot be decided whether it is violated, or None.
     """
 
     text: str
-    violated: Callable[[Scenario], str | None]
+    violated: Callable[[Any], str | None]
+    doubtful: Callable[[Any], str | None] = lambda subject: None
 
 
 class Verdict(NamedTuple):
@@ -44,7 +48,7 @@ class Verdict(NamedTuple):
     Attributes
     ----------
     status
-        Valid, valid under conditions, or refused.
+        Valid, valid under conditions, undecided (a number to look at, never one to quote), or refused.
     reasons
         One sentence each: grounds, conditions or violations.
     warnings
@@ -61,34 +65,58 @@ class Verdict(NamedTuple):
 
 
 def judge(
-    assumptions: tuple[Assumption, ...], scenario: Scenario, *, grounds: tuple[str, ...], conditions: tuple[str, ...]
+    assumptions: tuple[Assumption, ...], subject: Any, *, grounds: tuple[str, ...], conditions: tuple[str, ...]
 ) -> Verdict:
-    """Verdict of a method with these assumptions for a scenario.
+    """Verdict of a method with these assumptions for a scenario, or for anything else that they are predicates on.
 
     Parameters
     ----------
     assumptions
-        Checked in turn; a violation refuses.
+        Checked in turn; a violation refuses, a doubt leaves the verdict undecided.
     grounds
         Why the bound holds when nothing is violated.
     conditions
         What the number depends on beyond the model (for example one measured track).
     """
-    violations = tuple(reason for a in assumptions if (reason := a.violated(scenario)) is not None)
+    violations = tuple(reason for a in assumptions if (reason := a.violated(subject)) is not None)
     if violations:
         return Verdict(Status.REFUSED, violations)
+    warnings = dangers(subject) if isinstance(subject, Scenario) else subject.dangers()
+    doubts = tuple(doubt for a in assumptions if (doubt := a.doubtful(subject)) is not None)
+    if doubts:
+        return Verdict(Status.UNDECIDED, doubts + conditions, warnings)
     status = Status.CONDITIONAL if conditions else Status.VALID
-    return Verdict(status, conditions or grounds, dangers(scenario))
+    return Verdict(status, conditions or grounds, warnings)
 
 
 def regular_noise(scenario: Scenario) -> str | None:
     """Why the Fisher information of some noise does not exist, or None."""
     for link in scenario.links:
-        for noise in link.noises:
+        for mode, noise in enumerate(link.noises):
             regularity = noise.regularity()
-            if not regularity.finite:
-                return f"the noise of anchor {link.name} has no finite Fisher information: {regularity.reason}"
+            if regularity.finite is False:
+                return (
+                    f"the {_sight_name(link.noises, mode)}noise of anchor {link.name} has no finite Fisher "
+                    f"information: {regularity.reason}"
+                )
     return None
+
+
+def undecided_noise(scenario: Scenario) -> str | None:
+    """Why it is not known whether the Fisher information of some noise exists, or None."""
+    for link in scenario.links:
+        for mode, noise in enumerate(link.noises):
+            regularity = noise.regularity()
+            if regularity.finite is None:
+                return (
+                    f"whether the {_sight_name(link.noises, mode)}noise of anchor {link.name} has a finite Fisher "
+                    f"information is not known: {regularity.reason}"
+                )
+    return None
+
+
+def _sight_name(noises: tuple, mode: int) -> str:
+    return f"{('LOS', 'NLOS')[mode]} " if len(noises) == 2 else ""
 
 
 def all_sights_known(scenario: Scenario) -> str | None:
@@ -108,9 +136,22 @@ def two_modes(scenario: Scenario) -> str | None:
     return f"anchors {', '.join(other)} do not have exactly the modes LOS and NLOS" if other else None
 
 
-SMOOTH_NOISE = Assumption("every noise has a finite Fisher information about a shift", regular_noise)
+def not_separable(scenario: Scenario) -> str | None:
+    """Why links do not have chains and measurements of their own, or None."""
+    why = beyond_separation(scenario)
+    return None if why is None else f"{why}: bcrb takes that, this does not"
+
+
+def two_points(survey: Any) -> str | None:
+    """Why a survey tells nothing about accuracy, or None."""
+    return None if survey.points > 1 else f"the survey has {survey.points} point"
+
+
+SEPARABLE = Assumption("motion without modes, one chain per link, measurements that do not depend on it", not_separable)
+SMOOTH_NOISE = Assumption("every noise has a finite Fisher information about a shift", regular_noise, undecided_noise)
 KNOWN_SIGHT = Assumption("the sight of every link is known at every step", all_sights_known)
 LOS_AND_NLOS = Assumption("every link is either LOS or NLOS", two_modes)
+SURVEYED = Assumption("at least two surveyed points", two_points)
 
 
 @double_precision
@@ -126,6 +167,9 @@ def dangers(scenario: Scenario) -> tuple[str, ...]:
     if traced(scenario):
         return ()
     found: dict[str, list[str]] = {}
+    if not np.any(np.asarray(scenario.reports)):
+        names = [link.name for link in scenario.links]
+        found["no range is ever reported: every number is the prior's prediction"] = names
     intervals = scenario.times.intervals
     for link in scenario.links:
         if isinstance(link.sight, MarkovSight | DwellSight):

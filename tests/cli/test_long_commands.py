@@ -1,5 +1,8 @@
 """``track``, ``paper`` and ``fit`` through the shell: wrong options, and Ctrl-C in the middle."""
 
+import threading
+import time
+
 import pytest
 from typer.testing import CliRunner
 
@@ -63,6 +66,37 @@ def test_ctrl_c_between_bounds_keeps_the_finished_one(tmp_path, monkeypatch):
     monkeypatch.setattr("locbounds.bounds.conditional.enumer", interrupted)
     done = run("track", "s.toml", "--bounds", "bcrb,enumer", "--filters", "none", "--rtol", "0.1")
     assert done.exit_code == 130
-    assert done.stderr.startswith("error: interrupted\nremedy: kept what was finished: s-out/rmse.csv")
-    rows = (tmp_path / "s-out" / "rmse.csv").read_text().splitlines()
+    assert done.stderr.startswith("error: interrupted\nremedy: kept what was finished: s-out/partial-rmse.csv")
+    rows = (tmp_path / "s-out" / "partial-rmse.csv").read_text().splitlines()
     assert [row.split(",")[0] for row in rows] == ["method"] + ["bcrb"] * 4
+    assert not (tmp_path / "s-out" / "rmse.csv").exists()
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert run("track", "s.toml", "--bounds", "bcrb", "--filters", "none", "--rtol", "0.1").exit_code == 0
+    assert files(tmp_path / "s-out") == ["rmse.csv", "rmse.png", "run.nc"]  # the whole replaces the partial
+
+
+def test_ctrl_c_in_a_study_does_not_wait_for_the_bounds_that_run(monkeypatch):
+    from locbounds.papers import fritsche2013
+
+    running, ended = threading.Event(), threading.Event()
+
+    def interrupted(*_, **__):
+        assert running.wait(10)
+        raise KeyboardInterrupt
+
+    def slow(model, *, samples, seed, progress):
+        running.set()
+        try:
+            for _ in range(600):  # half a minute
+                time.sleep(0.05)
+                progress(1, 1.0, 1.0)
+        finally:
+            ended.set()
+
+    monkeypatch.setattr(fritsche2013, "simulate", lambda *_, **__: None)
+    monkeypatch.setattr(fritsche2013, "evaluate_on", interrupted)
+    monkeypatch.setattr(fritsche2013, "bcrb", slow)
+    with pytest.raises(KeyboardInterrupt):
+        next(fritsche2013.study(samples=1, runs=2))
+    assert ended.wait(5)

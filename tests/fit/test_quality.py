@@ -6,7 +6,7 @@ from scipy.stats import kstest, norm
 
 from fit.simulated import errors
 from locbounds.fit import RangeLog, Track, fit_quality, fit_sight_noise, quality_figure
-from locbounds.fit.quality import autocorrelation, smooth_errors
+from locbounds.fit.quality import _statement, autocorrelation, smooth_errors
 
 
 def log_of(time, error):
@@ -88,12 +88,29 @@ def test_drifting_errors_are_reported():
 def test_autocorrelation_is_that_of_numpy_and_skips_gaps():
     x = np.random.default_rng(0).normal(size=(1, 500)).cumsum(1)
     x -= x.mean()
-    expected = [np.mean(x[0, k:] * x[0, :-k]) / np.mean(x**2) for k in (1, 3)]
+    expected = [x[0, k:] @ x[0, :-k] / np.sqrt((x[0, k:] @ x[0, k:]) * (x[0, :-k] @ x[0, :-k])) for k in (1, 3)]
     assert autocorrelation(x, (1, 3)) == pytest.approx(expected)
     x[0, 100:200] = np.nan
     both = np.isfinite(x[0, 1:]) & np.isfinite(x[0, :-1])
-    expected = np.mean((x[0, 1:] * x[0, :-1])[both]) / np.nanmean(x**2)
+    later, earlier = x[0, 1:][both], x[0, :-1][both]
+    expected = later @ earlier / np.sqrt((later @ later) * (earlier @ earlier))
     assert autocorrelation(x, (1, 600)) == pytest.approx((expected, np.nan), nan_ok=True)
+
+
+def test_autocorrelation_stays_between_minus_one_and_one_however_few_pairs_there_are():
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        x = rng.standard_cauchy(size=(3, 12))
+        x[rng.random(x.shape) < 0.7] = np.nan  # one pair or none at most lags
+        found = np.array(autocorrelation(x, tuple(range(1, 12))))
+        assert np.all(np.isnan(found) | (np.abs(found) <= 1))
+    assert np.isnan(autocorrelation(np.zeros((1, 5)), (1,)))[0]
+
+
+def test_statements_count_ranges_in_words_that_make_sense():
+    assert "about 1.2 successive ranges" in _statement(0.08, 1.16)
+    assert "about 23 successive ranges" in _statement(0.9, 23.4)
+    assert "Too few" in _statement(float("nan"), 1.0)
 
 
 def test_figure_has_a_panel_per_link(fitted, tmp_path):

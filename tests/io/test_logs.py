@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from locbounds.errors import InputError
-from locbounds.io.logs import LogColumns, read_log
+from locbounds.io.log_columns import LogColumns
+from locbounds.io.logs import read_log
 
 ANCHORS = "anchor_id,x_m,y_m\n1,0,0\n2,10,0\n"
 RANGES = "track_id,step,anchor_id,range_m\na,0,1,1.0\na,1,1,2.0\na,1,2,8.0\na,2,2,7.5\nb,0,2,3.0\nb,1,1,4.0\n"
@@ -162,3 +163,28 @@ def test_degrees_beside_metres_are_refused(read):
     anchors = "anchor_id,x_m,y_m\n1,48.137154,11.576124\n2,48.138154,11.577124\n"
     with pytest.raises(InputError, match="degrees"):
         read(ranges, anchors=anchors, truth=None)
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"),
+    [(1e3, "millimetres"), (1e2, "centimetres"), (1e-3, "kilometres"), (-1, "negative metres"),
+     (1 / 0.3048, "feet or nanoseconds"), (1 / 0.299792458, "feet or nanoseconds")],
+)  # fmt: skip
+def test_ranges_of_one_anchor_in_another_unit_are_refused(read, factor, unit):
+    """Anchor 2 alone: the ranges of anchor 1 are right."""
+    truth = "step,time_s,x_true_m,y_true_m\n" + "".join(f"{k},{k},{k},20\n" for k in range(9))
+    rows = [(k, m, np.hypot(k - 10 * (m - 1), 20) + 0.2) for k in range(1, 9) for m in (1, 2)]
+    ranges = "step,anchor_id,range_m\n" + "".join(f"{k},{m},{z * (factor if m == 2 else 1)}\n" for k, m, z in rows)
+    with pytest.raises(InputError, match=f"anchor 2 look like {unit}"):
+        read(ranges, truth=truth)
+    good = "step,anchor_id,range_m\n" + "".join(f"{k},{m},{z}\n" for k, m, z in rows)
+    assert read(good, truth=truth).notes == ()
+
+
+def test_single_odd_ranges_are_kept_and_remarked(read):
+    log = read(RANGES.replace("a,1,1,2.0", "a,1,1,-0.3").replace("a,2,2,7.5", "a,2,2,7500"))
+    assert "1 of 4 ranges are negative, down to -0.3 m" in log.notes[0]
+    assert "1 ranges are longer than 1e+03 m" in log.notes[1]
+    timed = "time_s,anchor_id,range_m\n1.0,1,-1\n2.0,1,-2\n"
+    with pytest.raises(InputError, match="most ranges are negative"):
+        read(timed, truth=None)

@@ -61,7 +61,7 @@ def test_larger_chains_and_reducible_ones_have_a_start():
         (lambda: lb.MarkovSight([0.5, 0.5], [[1.1, -0.1], [0.1, 0.9]]), "negative"),
         (lambda: lb.MarkovSight([0.5, 0.5], [[0.9, 0.1]]), "square"),
         (lambda: lb.MarkovSight([1.0], [[0.9, 0.1], [0.1, 0.9]]), "shape"),
-        (lambda: lb.MarkovSight.stay(1.5), "negative"),
+        (lambda: lb.MarkovSight.stay(1.5), "from 0 to 1"),
         (lambda: lb.MarkovSight.stay(np.nan), "nan"),
         (lambda: lb.DwellSight(None, [0.0, 1.0]), "positive"),
         (lambda: lb.DwellSight(None, [-1.0, 1.0]), "positive"),
@@ -76,3 +76,10 @@ def test_larger_chains_and_reducible_ones_have_a_start():
 def test_chains_that_are_none_are_input_errors(build, match):
     with pytest.raises(lb.InputError, match=match):
         build()
+
+
+@pytest.mark.parametrize("stay", [1.5, -0.1, float("nan"), (0.9, 2.0)])
+def test_a_stay_that_is_no_probability_is_named_as_it_was_given(stay):
+    with pytest.raises(lb.InputError, match=r"keeping the sight is .*from 0 to 1") as caught:
+        lb.MarkovSight.stay(stay)
+    assert str(stay) in caught.value.cause

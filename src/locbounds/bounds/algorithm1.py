@@ -15,7 +15,7 @@ from locbounds.bounds.score_covariance import noise_process
 from locbounds.errors import InputError, RefusedError
 from locbounds.precision import double_precision, traced
 from locbounds.result import Result
-from locbounds.scenario import Scenario
+from locbounds.scenario import Scenario, beyond_separation
 from locbounds.simulation import draw_noise, draw_sight, draw_states
 
 DRAWS = 16  # samples per group and block: scores of all horizons are kept for one block at a time
@@ -141,6 +141,9 @@ def bcrb_algorithm1(scenario: Scenario, *, samples: int = 2048, seed: int = 0) -
     if traced(scenario):
         raise InputError("Algorithm 1 cannot be transformed by JAX", "Use locbounds.bcrb, which can")
     check_rtol(None, samples)
+    why = beyond_separation(scenario)
+    if why is not None:
+        raise RefusedError(f"{why}, which Algorithm 1 as printed does not know", "Use locbounds.bcrb")
     expectation, verdict = prepare("bcrb", scenario, Prior())
     scenario = scenario.anonymous()
     seed_key = np.uint32(check_seed(seed))

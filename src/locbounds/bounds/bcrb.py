@@ -10,14 +10,18 @@ from locbounds.axes import Array, Float
 from locbounds.blocks import GROUPS, check_seed
 from locbounds.bounds.common import bound_result, prepare
 from locbounds.bounds.expectation import Expectation
+from locbounds.bounds.general import general, model_verdict
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
 from locbounds.bounds.recursion import covariance_recursion
 from locbounds.bounds.score_covariance import NoiseProcess, noise_process, score_covariance_increments
 from locbounds.bounds.separated import SeparatedIncrements, geometry
-from locbounds.errors import InputError
+from locbounds.bounds.truncation import extrapolated, shortened
+from locbounds.errors import InputError, RefusedError
+from locbounds.model import JumpMarkov, jump_markov
 from locbounds.precision import double_precision, traced
 from locbounds.result import Result
-from locbounds.scenario import Scenario
+from locbounds.scenario import Scenario, beyond_separation
+from locbounds.verdict import Status
 
 PATHS = 64  # noise paths per group and block
 FIRST_WINDOW = 12
@@ -57,31 +61,16 @@ def _solve(scenario, C, G) -> _Solution:
     """
     index = np.array(scenario.motion.position_index)
     mean = C.mean(0), G.mean(0)
-    ages = np.arange(C.shape[-1])
-    cuts = [(ages < length)[:, None] & (ages < length) for length in (-(-n * len(ages) // 4) for n in (3, 2))]
+    cuts = [kept[:, None] & kept for kept in shortened(C.shape[-1])]
     every_C = jnp.concatenate([C, mean[0] * np.stack(cuts)[:, None, None]])
     every_G = G if len(G) == 1 else jnp.concatenate([G, mean[1][None], mean[1][None]])
     P, changes = covariance_recursion(scenario, SeparatedIncrements(*mean, (every_C, every_G)))
     return _Solution(Estimate(P, P[:, index, index].sum(-1), changes[:-2]), changes[-2:])
 
 
-def _truncation(solution: _Solution, left_out: float) -> float:
-    """Relative error of the position RMSE at the worst step that is due to the window, extrapolated.
-
-    The changes on shortening the window by a quarter and by a half say how fast they decay with its length:
-    geometrically with a ratio q per quarter, ``half / quarter = (1 + q) / q``, and what was left out makes
-    ``quarter * q / (1 - q)``. Where that is less than the last quarter itself, that quarter is reported; where nothing
-    decays, the last quarter as often as quarters were left out.
-    """
-    relative = np.abs(solution.shorter) / (2 * np.asarray(solution.estimate.position_mse))
-    quarter, half = (float(change.max()) for change in relative)
-    beyond = quarter / (half - 2 * quarter) if half > 2 * quarter else np.inf  # q / (1 - q)
-    return quarter * max(1.0, min(beyond, left_out))
-
-
 @double_precision
 def bcrb(
-    scenario: Scenario,
+    scenario: Scenario | JumpMarkov,
     *,
     rtol: float | None = None,
     samples: int | None = None,
@@ -90,16 +79,19 @@ def bcrb(
     window: int | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    r"""Bayesian Cramér-Rao bound of a jump-Markov measurement model, at every step.
+    r"""Bayesian Cramér-Rao bound of a jump-Markov model, at every step.
 
-    The information of the ranges is separated into the covariance of the noise score, a property of each link's noise
+    The engine is chosen by what the model needs; ``provenance.how`` names it and the reason. The general engine
+    (:mod:`locbounds.bounds.general`) takes every :class:`~locbounds.JumpMarkov` and every scenario whose motion
+    switches, whose measurements depend on the sight or whose links share a chain. All others separate: the information
+    of the ranges is separated into the covariance of the noise score, a property of each link's noise
     process (see :mod:`locbounds.bounds.score_covariance`), and the expected products of range gradients. Modes are
     never enumerated; links with equal noise processes share their noise draws.
 
     Parameters
     ----------
     scenario
-        The model. Chains and noises of different links are independent.
+        The model. Noises of different links are independent, and so are chains that are not named as one.
     rtol
         Largest relative standard error of the position RMSE over the steps; draws are added until it is reached.
         Default 1e-3.
@@ -146,7 +138,25 @@ def bcrb(
     >>> bool(abs(bound.mean_position_rmse() - 51.2) < 0.2)
     True
     """
+    if isinstance(scenario, JumpMarkov) or beyond_separation(scenario):
+        return _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress)
     return separated("bcrb", scenario, rtol, samples, seed, expectation, window, progress)
+
+
+def _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress) -> Result:
+    if traced(scenario, expectation):
+        raise InputError(
+            "the general engine cannot be transformed by JAX",
+            "Transform a scenario with links of their own chains and a motion without modes",
+        )
+    if isinstance(scenario, JumpMarkov):
+        verdict, model, why = model_verdict(scenario), scenario, "the model is a JumpMarkov"
+        if verdict.status is Status.REFUSED:
+            raise RefusedError(f"bcrb does not apply: {'; '.join(verdict.reasons)}", "See: locbounds explain bcrb")
+    else:
+        _, verdict = prepare("bcrb", scenario, None)
+        model, why = jump_markov(scenario.anonymous()), str(beyond_separation(scenario))
+    return general("bcrb", model, why, rtol, samples, seed, expectation, window, progress, verdict)
 
 
 @double_precision
@@ -227,7 +237,7 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
         solution = _solve(scenario, *tables)
         truncation = 0.0 if size == scenario.steps or id == "known-sight" else np.nan  # known sight: nothing to cut
         if window is None and size < scenario.steps and not differentiable:
-            truncation = _truncation(solution, 4 * (scenario.steps - size) / size)
+            truncation = extrapolated(solution.shorter, solution.estimate.position_mse, size, scenario.steps)
             if truncation > rtol_target / 10:
                 size = min(2 * size, scenario.steps)
                 continue

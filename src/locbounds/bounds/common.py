@@ -5,6 +5,7 @@ from typing import Any
 from locbounds.bounds.expectation import Expectation, Prior
 from locbounds.bounds.precision_control import Estimate
 from locbounds.errors import RefusedError
+from locbounds.model import JumpMarkov
 from locbounds.registry import method
 from locbounds.result import Provenance, Result
 from locbounds.scenario import Scenario
@@ -24,7 +25,7 @@ def prepare(id: str, scenario: Scenario, expectation: Expectation | None) -> tup
 
 def bound_result(
     id: str,
-    scenario: Scenario,
+    scenario: Scenario | JumpMarkov,
     estimate: Estimate,
     verdict: Verdict,
     expectation: Expectation,

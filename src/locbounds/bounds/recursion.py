@@ -7,7 +7,7 @@ window.
 """
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,33 @@ import numpy as np
 from locbounds.axes import Array, Float
 from locbounds.linalg import symmetrize
 from locbounds.scenario import Scenario
+
+
+class LinearModel(NamedTuple):
+    """Linear Gaussian motion and prior.
+
+    Attributes
+    ----------
+    observed
+        State components that the increments of information are about.
+    position
+        Those of the position.
+    """
+
+    F: Float[Array, "steps state state"]
+    Q: Float[Array, "steps state state"]
+    P0: Float[Array, "state state"]
+    observed: tuple[int, ...]
+    position: tuple[int, ...]
+
+
+def linear_model(scenario: Scenario | LinearModel) -> LinearModel:
+    """Motion and prior of a scenario, whose increments are about positions."""
+    if isinstance(scenario, LinearModel):
+        return scenario
+    position = scenario.motion.position_index
+    P0 = jnp.asarray(scenario.prior.covariance)
+    return LinearModel(scenario.transition, scenario.process_noise, P0, position, position)
 
 
 class Increments(ABC):
@@ -72,14 +99,14 @@ class GivenIncrements(Increments):
 
 
 def covariance_recursion(
-    scenario: Scenario, increments: Increments
+    scenario: Scenario | LinearModel, increments: Increments
 ) -> tuple[Float[Array, "times state state"], Float[Array, "groups times"]]:
     """Bound on the mean square error matrix at steps 0..K, and first-order changes of its position part.
 
     Parameters
     ----------
     scenario
-        Motion and prior are taken from it.
+        Motion and prior are taken from it; or these alone.
     increments
         The information that the steps add.
 
@@ -97,9 +124,10 @@ def covariance_recursion(
     ``dS <- T dS T'`` and ``d (S^-1 + D)^-1 = K dS K' - S_p+ dD S_p+'`` with ``K = S+ S^-1 = I - S_p+ D``: all of them
     share the matrices, so that each step is four matrix products.
     """
-    n, groups = scenario.motion.state_size, increments.groups
-    window = _Window(scenario, increments.ages)
-    index = np.array(scenario.motion.position_index)
+    model = linear_model(scenario)
+    n, groups = len(model.P0), increments.groups
+    window = _Window(model, increments.ages)
+    index = np.array(model.position)
 
     def step(carry, inputs):
         S, dS, carried = carry
@@ -113,9 +141,9 @@ def covariance_recursion(
         return (S, dS, carried), (S[:n, :n], dS[index, :, index].sum(0))
 
     first = window.first(), jnp.zeros((window.size, groups, window.size)), increments.first()
-    inputs = scenario.transition, scenario.process_noise, increments.pieces
+    inputs = model.F, model.Q, increments.pieces
     _, (later, changes) = jax.lax.scan(step, first, inputs)
-    P = jnp.concatenate([jnp.asarray(scenario.prior.covariance)[None], later])
+    P = jnp.concatenate([jnp.asarray(model.P0)[None], later])
     return P, jnp.concatenate([jnp.zeros((groups, 1)), changes.T], axis=1)
 
 
@@ -129,11 +157,11 @@ def _congruence(A: Float[Array, "a b"], X: Float[Array, "b groups b"]) -> Float[
 class _Window:
     """The last states as one vector [x_k, position at age 1, ..., position at age W-1] and its covariance."""
 
-    def __init__(self, scenario: Scenario, ages: int):
-        n, d = scenario.motion.state_size, scenario.dim
-        position = np.array(scenario.motion.position_index)
+    def __init__(self, model: LinearModel, ages: int):
+        n, d = len(model.P0), len(model.observed)
+        position = np.array(model.observed)
         self.n, self.size = n, n + d * (ages - 1)
-        self.prior = scenario.prior.covariance
+        self.prior = model.P0
         self.observed = np.concatenate([position, np.arange(n, self.size)])
         self.age = np.zeros((self.size, self.size))  # ages move on by one; age 1 is taken from the state
         if ages > 1:

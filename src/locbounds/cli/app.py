@@ -12,6 +12,9 @@ from locbounds.cli.failures import Program
 from locbounds.cli.fit import fit
 from locbounds.cli.new import new
 from locbounds.cli.paper import paper
+from locbounds.cli.score import score
+from locbounds.cli.simulate import simulate
+from locbounds.cli.survey import survey
 from locbounds.cli.track import track
 
 app = typer.Typer(
@@ -53,7 +56,10 @@ def program(
 app.command()(new)
 app.command()(check)
 app.command()(track)
+app.command()(simulate)
+app.command()(score)
 app.command()(fit)
+app.command()(survey)
 app.command()(paper)
 app.command()(explain)
 

@@ -1,31 +1,48 @@
 """``locbounds explain``: what a method assumes, when it fails, whom to cite."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from locbounds.cli.options import JsonOption
+from locbounds.errors import InputError
 
 
 def explain(
     id: Annotated[
-        str | None, typer.Argument(metavar="[ID]", help="A bound or filter; left out: the list of all.")
+        str | None, typer.Argument(metavar="[ID]", help="A bound or filter, or regularity; left out: the list of all.")
+    ] = None,
+    scenario: Annotated[
+        Path | None, typer.Option("--scenario", metavar="SCENARIO.toml", help="Check every assumption for it.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Say what a bound or filter assumes, when it fails and whom to cite.
+    """Say what a bound or filter assumes, when it fails and whom to cite; with a scenario, what holds there.
 
-    Example: locbounds explain bcrb
+    Example: locbounds explain bcrb --scenario scenario.toml
     """
     from locbounds import registry
     from locbounds.cli.output import print_json, print_table
 
+    model = None
+    if scenario is not None:
+        from locbounds.io.scenario_file import load
+
+        if id is None:
+            raise InputError("a scenario was given, but no method", "Name one: locbounds explain bcrb --scenario FILE")
+        model = load(scenario)
+    if id in registry.TOPICS:
+        return print_json({"id": id, "text": registry.explain(id)}) if json else typer.echo(registry.explain(id))
     entries = [registry.describe(m) for m in (registry.METHODS.values() if id is None else [registry.method(id)])]
     if json:
+        if model is not None and id is not None:
+            checks = [{"assumption": text, "violated": why} for text, why in registry.method(id).check(model)]
+            entries[0] |= {"checks": checks, "verdict": str(registry.method(id).verdict(model))}
         print_json(entries if id is None else entries[0])
     elif id is None:
         columns = ("id", "kind", "summary")
         print_table("Bounds and filters", columns, [[entry[c] for c in columns] for entry in entries])
-        typer.echo("More about one: locbounds explain ID")
+        typer.echo("More about one: locbounds explain ID; when bounds exist at all: locbounds explain regularity")
     else:
-        typer.echo(registry.explain(id))
+        typer.echo(registry.explain(id, model))

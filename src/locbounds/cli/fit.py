@@ -8,8 +8,10 @@ import typer
 from locbounds.cli.log_options import (
     AnchorsOption,
     ColumnsOption,
+    EveryOption,
     HoldOutOption,
     LabelsOption,
+    MergeOption,
     SelectOption,
     TimeOffsetOption,
     TruthOption,
@@ -25,13 +27,19 @@ def fit(
     truth: TruthOption = None,
     select: SelectOption = None,
     hold_out: HoldOutOption = None,
-    time_offset: TimeOffsetOption = 0.0,
+    time_offset: TimeOffsetOption = "0",
+    merge: MergeOption = 0.0,
+    every: EveryOption = 1,
     labels: LabelsOption = None,
     columns: ColumnsOption = None,
     per_anchor: Annotated[bool, typer.Option("--per-anchor", help="Noise and dwell times for every anchor.")] = False,
     psd: Annotated[
         float | None,
         typer.Option("--psd", metavar="M2_S3", help="Acceleration intensity, if the truth cannot tell it."),
+    ] = None,
+    noise: Annotated[
+        str | None,
+        typer.Option("--noise", metavar="FAMILY|auto", help="Also compare laws of the error; auto: all families."),
     ] = None,
     out: OutOption = None,
     json: JsonOption = False,
@@ -40,11 +48,13 @@ def fit(
     """Fit noise, sight, motion and prior to a log of real ranges; write a scenario that track runs as it is.
 
     Writes scenario.toml (its comments say where every number came from), quality.csv, autocorrelation.csv and
-    quality.png.
+    quality.png; with --noise also noise.csv: which law the errors follow, and how far the others lie behind. Where
+    the log has labels, scenario.toml then takes the best law of each sight.
 
     [bold]Example[/bold]: locbounds fit ranges.csv --anchors anchors.csv --truth truth.csv --select scene=canteen
     --hold-out 4
     """
+    from locbounds.cli.fit_noise import HEADER, compare, with_best_laws
     from locbounds.fit import fit_scenario, quality_figure
     from locbounds.fit.quality import PROBABILITIES
     from locbounds.io.scenario_file import dumps
@@ -52,13 +62,18 @@ def fit(
 
     with output_folder(default_out(ranges.name.split(".")[0], out), force=force) as folder:
         with status("reading") as say:
-            log = read(ranges, anchors, truth, select, time_offset, columns, labels)
+            log = read(ranges, anchors, truth, select, time_offset, merge, every, columns, labels)
             kept, held = log.hold_out(hold_out) if hold_out is not None else (log, None)
             say(f"fitting {kept.ranges:,} ranges of {len(kept.tracks)} tracks")
             title = f"Fitted to {ranges.name}" + (f", {select}" if select else "")
             fitted = fit_scenario(kept, held_out=held, per_anchor=per_anchor, psd_m2_s3=psd, title=title)
+            laws = {} if noise is None else compare(kept, held, noise, say)
         quality = fitted.quality
-        folder.write_text("scenario.toml", dumps(fitted.scenario, fitted.comments))
+        scenario, comments, notes = with_best_laws(fitted, laws)
+        folder.write_text("scenario.toml", dumps(scenario, comments))
+        law_rows = [row for rows in laws.values() for row in rows]
+        if law_rows:
+            folder.write_text("noise.csv", csv_text(HEADER, law_rows))
         quantiles = [f"{kind}_q{100 * p:02.0f}_m" for p in PROBABILITIES for kind in ("measured", "fitted")]
         rows = [
             (q.name, q.ranges, q.mean_m, q.fitted_mean_m, q.std_m, q.fitted_std_m, q.nlos_share, q.ks)
@@ -80,9 +95,9 @@ def fit(
         figure = quality_figure(kept, fitted.noise, quality)
         folder.write("quality.png", lambda path: figure.savefig(path, dpi=150))
     if json:
-        print_json({"comments": fitted.comments, "notes": fitted.notes, "links": rows, "autocorrelation": lags})
+        print_json({"comments": comments, "notes": notes, "links": rows, "autocorrelation": lags, "noise": law_rows})
         return
-    print_table("Where the numbers came from", ("key", "source"), list(fitted.comments.items()))
+    print_table("Where the numbers came from", ("key", "source"), list(comments.items()))
     print_table(
         "Errors per link, measured and fitted",
         ("anchor", "ranges", "mean m", "fitted", "std m", "fitted", "NLOS share", "KS distance"),
@@ -93,7 +108,13 @@ def fit(
         ("lag in steps", "errors", "explained by the chain", "left in the residuals"),
         [tuple(round(x, 3) if isinstance(x, float) else x for x in row) for row in lags],
     )
-    for note in fitted.notes:
+    for name, table in laws.items():
+        print_table(
+            f"Laws of the error, {name}: mean log density (1/m) of held-out errors",
+            HEADER[1:],
+            [row[1:] for row in table],
+        )
+    for note in notes:
         typer.echo(note)
     typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")
     typer.echo(f"next: locbounds track {folder.path / 'scenario.toml'}")

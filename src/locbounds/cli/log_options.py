@@ -23,10 +23,17 @@ HoldOutOption = Annotated[
     typer.Option("--hold-out", metavar="TRACKS", help="Tracks kept from the fit: names, or a number (the last ones)."),
 ]
 TimeOffsetOption = Annotated[
-    float, typer.Option("--time-offset", metavar="S", help="Seconds added to the times of the ranges.")
+    str, typer.Option("--time-offset", metavar="S|auto", help="Seconds added to the times of the ranges, or auto.")
+]
+MergeOption = Annotated[
+    float,
+    typer.Option("--merge", metavar="S", min=0, help="Ranges of different anchors within S seconds make one step."),
+]
+EveryOption = Annotated[
+    int, typer.Option("--every", metavar="N", min=1, help="Keep the ranges of every N-th step only.")
 ]
 LabelsOption = Annotated[
-    str | None, typer.Option("--labels", metavar="COLUMN", help="Column of the ranges that says los or nlos.")
+    str | None, typer.Option("--labels", metavar="COLUMN", help="Column (ranges or truth) that says los or nlos.")
 ]
 ColumnsOption = Annotated[
     list[str] | None,
@@ -39,12 +46,15 @@ def read(
     anchors: Path | None,
     truth: Path | None,
     select: str | None,
-    time_offset: float,
+    time_offset: str,
+    merge: float,
+    every: int,
     columns: list[str] | None,
     labels: str | None,
 ) -> "RangeLog":
     """The log that these options describe; an InputError names the file that is missing."""
-    from locbounds.io.logs import LogColumns, read_log
+    from locbounds.io.log_columns import LogColumns
+    from locbounds.io.logs import read_log
 
     missing = [
         name for name, path in (("--ranges", ranges), ("--anchors", anchors), ("--truth", truth)) if path is None
@@ -57,6 +67,15 @@ def read(
         truth=truth,
         columns=LogColumns.parse(columns or []),
         select=select,
-        time_offset_s=time_offset,
+        time_offset_s=_offset(time_offset),
+        merge_s=merge,
+        every=every,
         labels=labels,
     )
+
+
+def _offset(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text

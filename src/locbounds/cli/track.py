@@ -7,7 +7,9 @@ import typer
 from locbounds.cli.log_options import (
     AnchorsOption,
     ColumnsOption,
+    EveryOption,
     HoldOutOption,
+    MergeOption,
     RangesOption,
     SelectOption,
     TimeOffsetOption,
@@ -46,7 +48,9 @@ def track(
     truth: TruthOption = None,
     select: SelectOption = None,
     hold_out: HoldOutOption = None,
-    time_offset: TimeOffsetOption = 0.0,
+    time_offset: TimeOffsetOption = "0",
+    merge: MergeOption = 0.0,
+    every: EveryOption = 1,
     columns: ColumnsOption = None,
     out: OutOption = None,
     json: JsonOption = False,
@@ -55,33 +59,38 @@ def track(
     """Bounds on the tracking error over time, and what filters reach.
 
     Writes rmse.csv, run.nc and rmse.png. With a log of real ranges (--ranges, --anchors, --truth) the filters run on
-    the measured ranges instead of simulated ones and the bound is computed along the measured tracks.
+    the measured ranges instead of simulated ones and the bound is computed along the measured tracks. After Ctrl-C
+    what was finished is in partial-rmse.csv, partial-run.nc and partial-rmse.png.
 
     [bold]Example[/bold]: locbounds track scenario.toml --bounds bcrb,enumer --filters imm-ekf --rtol 1e-3
     """
     from locbounds.io.scenario_file import load
 
     model = load(scenario)
-    chosen_bounds = _bounds(model, bounds)
+    chosen_bounds = applicable_bounds(model, bounds)
     chosen_filters = _filters(model, filters)
     if not chosen_bounds and not chosen_filters:
         raise InputError("neither a bound nor a filter was asked for", "Name at least one with --bounds or --filters")
     with output_folder(default_out(scenario, out), force=force) as folder:
         if ranges is not None or anchors is not None or truth is not None:
-            log = read(ranges, anchors, truth, select, time_offset, columns, None)
+            log = read(ranges, anchors, truth, select, time_offset, merge, every, columns, None)
             _along_log(model, log, hold_out, chosen_bounds, chosen_filters, rtol, seed, folder, json)
         else:
             _on_model(model, chosen_bounds, chosen_filters, rtol, runs, seed, folder, json)
 
 
-def _bounds(model: "Scenario", ids: str | None) -> "list[Method]":
-    from locbounds.registry import METHODS, method
+def applicable_bounds(model: "Scenario", ids: str | None) -> "list[Method]":
+    """The bounds that were named, or all that apply."""
+    from locbounds.registry import bounds_of, method
     from locbounds.verdict import Status
 
     if ids is not None:
-        return [] if ids == "none" else [method(id.strip(), "bound") for id in ids.split(",")]
-    applicable = [m for m in METHODS.values() if m.kind == "bound"]
-    applicable = [m for m in applicable if m.verdict(model).status is not Status.REFUSED]
+        chosen = [] if ids == "none" else [method(id.strip(), "bound") for id in ids.split(",")]
+        for m in chosen:
+            if m.subject != "scenario":
+                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", f"Run locbounds {m.subject}")
+        return chosen
+    applicable = [m for m in bounds_of("scenario") if m.verdict(model).status is not Status.REFUSED]
     known = any(m.id == "known-sight" for m in applicable)  # then nothing is left to average over
     return [m for m in applicable if not (known and m.id in ("bcrb", "enumer"))]
 
@@ -90,7 +99,9 @@ def _filters(model: "Scenario", ids: str | None) -> list[Any]:
     from locbounds import registry
 
     if ids is None:
-        ids = f"{'imm-ekf' if len(model.links) <= JOINT_ANCHORS else 'imm-ekf-factorised'},imm-kf"
+        ids = "imm-ekf" if len(model.links) <= JOINT_ANCHORS else "imm-ekf-factorised"
+        if model.motion.state_size == 2 * model.dim:  # imm-kf smooths ranges and range rates
+            ids += ",imm-kf"
     return [] if ids == "none" else [registry.load(registry.method(id.strip(), "filter"))() for id in ids.split(",")]
 
 
@@ -112,6 +123,7 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
             with count_progress(filter.name) as progress:
                 results.append(evaluate_on(filter, model, draws, seed=seed, progress=progress))
     except KeyboardInterrupt:
+        folder.partial = True
         _save(results, model, folder)
         raise
     _save(results, model, folder)
@@ -150,13 +162,15 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
 
 
 def _save(results, model, folder) -> None:
-    """Files of what was computed, after Ctrl-C too."""
+    """Files of what was computed; after Ctrl-C they are called partial."""
     from locbounds.report import dataset, plot, tables
+
+    title = f"{model.title} (interrupted)" if folder.partial else model.title
 
     if results:
         folder.write_text("rmse.csv", tables.csv_text(tables.RMSE_COLUMNS, tables.rmse_rows(results)))
         folder.write("run.nc", lambda path: dataset.save(results, path))
-        folder.write("rmse.png", lambda path: plot.rmse(results, title=model.title).savefig(path, dpi=150))
+        folder.write("rmse.png", lambda path: plot.rmse(results, title=title).savefig(path, dpi=150))
 
 
 def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) -> None:

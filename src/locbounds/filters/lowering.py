@@ -6,11 +6,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from locbounds.axes import Array, Float
-from locbounds.errors import InputError
+from locbounds.errors import InputError, RefusedError
 from locbounds.filters.estimates import Estimates
 from locbounds.filters.tracks_last import Pattern, pattern
 from locbounds.precision import traced
-from locbounds.scenario import Scenario
+from locbounds.scenario import Scenario, beyond_separation
 
 
 class Model(NamedTuple):
@@ -58,7 +58,14 @@ def lower(scenario: Scenario) -> Model:
     ------
     InputError
         If links differ in their number of sight conditions.
+    RefusedError
+        If the motion switches, a measurement depends on the sight, or links share a chain.
     """
+    why = beyond_separation(scenario)
+    if why is not None:
+        raise RefusedError(
+            f"{why}, which the library's filters do not know", "Evaluate a filter of your own, any callable"
+        )
     modes = {len(link.noises) for link in scenario.links}
     if len(modes) > 1:
         raise InputError(

@@ -13,8 +13,9 @@ from locbounds.bounds import AlongTrack
 from locbounds.errors import InputError
 from locbounds.evaluation import estimates, position_error
 from locbounds.fit.range_log import RangeLog, Track
+from locbounds.measurement import Range
 from locbounds.result import Result
-from locbounds.scenario import Scenario
+from locbounds.scenario import Link, Scenario
 
 LABEL = "the measured tracks"
 EXPLANATION = (
@@ -82,7 +83,13 @@ class AlongTracks:
 
 
 def on_track(scenario: Scenario, track: Track) -> Scenario:
-    """The scenario on the times and reports of one measured track."""
+    """The scenario on the times, reports and (where the track says so) anchors of one measured track."""
+    if track.anchors_m is not None:
+        links = [
+            Link(a.name, Range(place), a.sight, a.noises, a.reports)
+            for a, place in zip(scenario.links, track.anchors_m, strict=True)
+        ]
+        scenario = scenario.replace(links=links)
     return scenario.with_times(track.time_s - track.time_s[0]).with_reports(track.reports)
 
 
@@ -100,6 +107,7 @@ def _padded(track: Track, steps: int) -> Track:
         np.concatenate([time_s, time_s[-1] + tick * np.arange(1, more + 1)]),
         np.concatenate([track.ranges_m, np.full((more, track.ranges_m.shape[1]), np.nan)]),
         np.concatenate([place, np.repeat(place[-1:], more, axis=0)]),
+        anchors_m=track.anchors_m,
     )
 
 

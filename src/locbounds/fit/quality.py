@@ -125,18 +125,24 @@ def _moments(fit: SightNoiseFit) -> tuple[float, float, float]:
 def autocorrelation(x: Float[ndarray, "sequences steps"], lags: tuple[int, ...]) -> tuple[float, ...]:
     """Autocorrelation at lags in steps, pooled over sequences; pairs with a missing value (NaN) are left out.
 
+    The products of the pairs over the geometric mean of the squares of their first and second members: never outside
+    -1..1, however few pairs there are and whatever else the sequences hold. NaN without a pair.
+
     Examples
     --------
     >>> autocorrelation(np.array([[1.0, -1.0, 1.0, -1.0, np.nan]]), (1, 2))
     (-1.0, 1.0)
     """
     there = np.isfinite(x)
-    x = np.where(there, x, 0.0)
-    variance = (x**2).sum() / max(there.sum(), 1)
     found = []
     for lag in lags:
-        pairs = (there[:, lag:] & there[:, :-lag]).sum() if lag < x.shape[1] else 0
-        found.append(float((x[:, lag:] * x[:, :-lag]).sum() / pairs / variance) if pairs else float("nan"))
+        pairs = there[:, lag:] & there[:, :-lag] if lag < x.shape[1] else np.zeros(1, bool)
+        if not pairs.any():
+            found.append(float("nan"))
+            continue
+        later, earlier = x[:, lag:][pairs], x[:, :-lag][pairs]
+        size = np.sqrt((later**2).sum() * (earlier**2).sum())
+        found.append(float(np.clip((later * earlier).sum() / size, -1, 1)) if size > 0 else float("nan"))
     return tuple(found)
 
 
@@ -225,7 +231,8 @@ def fit_quality(
             )
         )
     longest = min(200, errors.error_m.shape[1] - 1)
-    curve = np.nan_to_num(autocorrelation(scores, tuple(range(1, longest + 1))))
+    measured = autocorrelation(scores, tuple(range(1, longest + 1)))
+    curve = np.nan_to_num(measured)
     last = int(np.argmax(curve < WHITE)) if (curve < WHITE).any() else len(curve)
     time = float(1 + 2 * curve[:last].sum())
     return FitQuality(
@@ -235,18 +242,21 @@ def fit_quality(
         model_autocorrelation=tuple((model / total).tolist()),
         residual_autocorrelation=autocorrelation(scores, lags),
         correlation_time=time,
-        statement=_statement(float(curve[0]) if len(curve) else 0.0, time),
+        statement=_statement(measured[0] if measured else float("nan"), time),
     )
 
 
 def _statement(first: float, time: float) -> str:
     at = f"(autocorrelation {first:.2f} at one step"
+    if not np.isfinite(first):
+        return "Too few successive ranges of one link to say whether the errors left by the fit are white."
     if first < WHITE:
         return f"The errors left by the fit are nearly white {at}), as the bound assumes."
+    digits = 0 if time >= 9.5 else 1
     return (
-        f"The errors left by the fit are not white {at}; about {time:.0f} successive ranges of a link tell as much as "
-        "one independent range), while the bound takes every range as new information: it is optimistic, and the "
-        f"accuracy possible with such ranges is worse, for a slow mobile by up to about {np.sqrt(time):.1f} times."
+        f"The errors left by the fit are not white {at}; about {time:.{digits}f} successive ranges of a link tell as "
+        "much as one independent range), while the bound takes every range as new information: it is optimistic, and "
+        f"the accuracy possible with such ranges is worse, for a slow mobile by up to about {np.sqrt(time):.1f} times."
     )
 
 

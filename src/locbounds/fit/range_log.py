@@ -32,6 +32,10 @@ class Track:
         True positions.
     sight : int array [steps, links] or None
         Labels: 0 LOS, 1 NLOS, -1 unknown.
+    anchors_m : array [links, space] or None
+        Positions of the anchors along this track, where they differ between tracks.
+    truth_time_s, truth_m : arrays [rows] and [rows, space] or None
+        The truth as it was given, at its own times, where ``position_m`` is interpolated from it.
     """
 
     name: str
@@ -39,9 +43,13 @@ class Track:
     ranges_m: Float[ndarray, "steps links"]
     position_m: Float[ndarray, "times space"] | None = None
     sight: Int[ndarray, "steps links"] | None = None
+    anchors_m: Float[ndarray, "links space"] | None = None
+    truth_time_s: Float[ndarray, " rows"] | None = None
+    truth_m: Float[ndarray, "rows space"] | None = None
 
     def __post_init__(self):
-        for key, dtype in (("time_s", float), ("ranges_m", float), ("position_m", float), ("sight", int)):
+        for key in ("time_s", "ranges_m", "position_m", "sight", "anchors_m", "truth_time_s", "truth_m"):
+            dtype = int if key == "sight" else float
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, _frozen(getattr(self, key), dtype))
         if len(self.time_s) != len(self.ranges_m) + 1 or len(self.time_s) < 2:
@@ -56,6 +64,15 @@ class Track:
     def steps(self) -> int:
         """Number of steps K with measurements."""
         return len(self.ranges_m)
+
+    @property
+    def path(self) -> tuple[Float[ndarray, " n"], Float[ndarray, "n space"]]:
+        """Times and true positions as they were given: what motion is fitted to."""
+        if self.truth_time_s is not None and self.truth_m is not None:
+            return self.truth_time_s, self.truth_m
+        if self.position_m is None:
+            raise InputError(f"track {self.name} has no true positions", "Give the truth file")
+        return self.time_s, self.position_m
 
     @property
     def reports(self) -> Bool[ndarray, "steps links"]:
@@ -75,12 +92,13 @@ class ErrorSequences(NamedTuple):
 
 @dataclass(frozen=True)
 class RangeLog:
-    """Tracks of ranges to the same anchors.
+    """Tracks of ranges to the same anchors, which may stand elsewhere along another track.
 
     Attributes
     ----------
     anchor_names : tuple of str
     anchors_m : array [links, space]
+        Where a track does not say otherwise.
     tracks : tuple of Track
     notes : tuple of str
         What was left out or looked odd while reading.
@@ -119,6 +137,10 @@ class RangeLog:
         """Whether every track has true positions."""
         return all(track.position_m is not None for track in self.tracks)
 
+    def anchors_of(self, track: Track) -> Float[ndarray, "links space"]:
+        """Positions of the anchors along one track."""
+        return self.anchors_m if track.anchors_m is None else track.anchors_m
+
     def errors(self) -> ErrorSequences:
         """Range minus true distance for every link along every track; missing NaN, padded with NaN times."""
         if not self.has_truth:
@@ -128,7 +150,7 @@ class RangeLog:
         time, error, sight = np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, -1)
         for i, track in enumerate(self.tracks):
             assert track.position_m is not None
-            distance = np.linalg.norm(track.position_m[1:, None] - self.anchors_m, axis=-1)
+            distance = np.linalg.norm(track.position_m[1:, None] - self.anchors_of(track), axis=-1)
             time[i, :, : track.steps] = track.time_s[1:]
             error[i, :, : track.steps] = (track.ranges_m - distance).T
             if track.sight is not None:

@@ -119,7 +119,7 @@ def fit_scenario(
             "Give the truth file (--truth), or write the scenario by hand",
         )
     noise, pooled, notes = _noise(log, per_anchor, outliers)
-    times, places = [t.time_s for t in log.tracks], [np.asarray(t.position_m) for t in log.tracks]
+    times, places = zip(*(t.path for t in log.tracks), strict=True)
     motion = None if psd_m2_s3 is not None else fit_psd(times, places, truth_std_m=truth_std_m)
     comments = _noise_comments(pooled, noise, per_anchor)
     if motion is None:
@@ -144,10 +144,11 @@ def fit_scenario(
 
     typical = _typical((held_out or log).tracks)
     comments["time"] = f"times and reports of track {typical.name} ({'held out' if held_out else 'fitted'})"
-    comments["anchors"] = "positions from the anchor file"
+    own = typical.anchors_m is not None
+    comments["anchors"] = f"positions from the anchor file{f', those of track {typical.name}' if own else ''}"
     links = [
         Link(name, Range(place), *_laws(noise[name]), typical.reports[:, m])
-        for m, (name, place) in enumerate(zip(log.anchor_names, log.anchors_m, strict=True))
+        for m, (name, place) in enumerate(zip(log.anchor_names, log.anchors_of(typical), strict=True))
     ]
     scenario = Scenario(
         title=title,
@@ -216,15 +217,17 @@ def _count(n: int, what: str) -> str:
 
 def _noise_comments(pooled: SightNoiseFit, noise: Mapping[str, SightNoiseFit], per_anchor: bool) -> dict[str, str]:
     def lines(prefix: str, fit: SightNoiseFit) -> dict[str, str]:
-        def error(*names: str) -> str:
-            values = [f"{fit.stderr[name]:.2g}" for name in names]
-            return "no s.e. from one track" if fit.groups < 2 else "s.e. " + ", ".join(values)
+        def error(*names: str, unit: str = "") -> str:
+            values = [fit.stderr[name] for name in names]
+            if not np.isfinite(values).any():
+                return "no s.e. from one track" if fit.groups < 2 else "no s.e. from one such track or at a limit"
+            return "s.e. " + ", ".join(f"{value:.2g}" if np.isfinite(value) else "none" for value in values) + unit
 
         source = f"maximum likelihood, {_count(fit.groups, 'track')}, {_count(fit.ranges, 'range')}"
         found = {
-            f"{prefix}.los": f"{source}, {error('los_mean_m', 'los_std_m')} m (mean, deviation)",
-            f"{prefix}.nlos": f"{source}, {error('nlos_mean_m', 'nlos_std_m')} m (mean, deviation)",
-            f"{prefix}.sight": f"{source}, {error('los_dwell_s', 'nlos_dwell_s')} s; start: long-run shares",
+            f"{prefix}.los": f"{source}, {error('los_mean_m', 'los_std_m', unit=' m (mean, deviation)')}",
+            f"{prefix}.nlos": f"{source}, {error('nlos_mean_m', 'nlos_std_m', unit=' m (mean, deviation)')}",
+            f"{prefix}.sight": f"{source}, {error('los_dwell_s', 'nlos_dwell_s', unit=' s')}; start: long-run shares",
         }
         if fit.outliers:
             found[f"{prefix}.outlier"] = (

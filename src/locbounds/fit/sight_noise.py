@@ -276,6 +276,7 @@ def _result(problem: Problem, top: Maximum, data: Sequences, own: Units, group) 
     def deviations(covariance) -> dict[str, float]:
         used = np.nan_to_num(jac, nan=0.0)
         variance = np.diag(used @ covariance @ used.T)
+        variance = np.where(variance >= 0, variance, np.nan)  # a likelihood that is flat, or no maximum, there
         fixed = ~(used[:, inner] != 0).any(1)
         return {k: float("nan") if f else float(np.sqrt(v)) for k, f, v in zip(numbers, fixed, variance, strict=True)}
 
@@ -283,6 +284,8 @@ def _result(problem: Problem, top: Maximum, data: Sequences, own: Units, group) 
     gain, offset = maximum.to_si(own)
     n = int(np.isfinite(data.e).sum())
     stderr = deviations(robust)
+    for sight in _told_apart_once(data, group):
+        stderr |= dict.fromkeys((f"{sight}_mean_m", f"{sight}_std_m"), float("nan"))
     return SightNoiseFit(
         **{k: float(v) for k, v in numbers.items() if k != "nlos_share"},
         stderr=stderr,
@@ -295,6 +298,15 @@ def _result(problem: Problem, top: Maximum, data: Sequences, own: Units, group) 
         stationary=problem.stationary,
         notes=_notes(problem, top.theta, numbers, own, labelled=bool((data.label >= 0).any())),
     )
+
+
+def _told_apart_once(data: Sequences, group) -> list[str]:
+    """Which sight was labelled in one group only, where all is labelled: no spread over groups tells its s.e."""
+    there = np.isfinite(data.e)
+    if (data.label[there] < 0).any():
+        return []
+    counts = [len(np.unique(group[(there & (data.label == sight)).any(1)])) for sight in (0, 1)]
+    return [name for name, n in zip(("los", "nlos"), counts, strict=True) if n < 2]
 
 
 def _notes(problem: Problem, theta, x: dict[str, float], own: Units, *, labelled: bool):

@@ -2,15 +2,19 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
 
 from locbounds.axes import LOS, NLOS, ndarray
 from locbounds.errors import InputError
+from locbounds.io import noise_families
 from locbounds.io.anchors_csv import read_anchors
 from locbounds.io.complain import quoted, unknown_key_remedy
 from locbounds.io.schema import (
+    MOTION_KEYS,
+    SPREADS,
     AnchorTable,
     LinksSection,
     MotionSection,
@@ -23,8 +27,9 @@ from locbounds.io.schema import (
     TimeSection,
 )
 from locbounds.measurement import Range
-from locbounds.motion import ConstantVelocity
-from locbounds.noise import Gaussian, GaussianMixture, Noise
+from locbounds.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, Motion, RandomWalk
+from locbounds.noise import Gaussian, GaussianMixture, Mixture, Noise
+from locbounds.noise.sums import add
 from locbounds.priors import GaussianPrior
 from locbounds.scenario import Link, Scenario
 from locbounds.sight import DwellSight, KnownSight, MarkovSight, Sight
@@ -54,18 +59,24 @@ def build_times(time: TimeSection) -> Times:
         return Times.uniform(step_s=time.step_s, steps=time.steps)
 
 
-def build_motion(motion: MotionSection, dim: int) -> ConstantVelocity:
+def build_motion(motion: MotionSection, dim: int) -> Motion:
     """Motion model in as many dimensions as the prior."""
-    discrete = motion.model == "constant-velocity-discrete"
-    name = "acceleration_var_m2_s4" if discrete else "psd_m2_s3"
+    name = MOTION_KEYS[motion.model][0]
     intensity = getattr(motion, name)
-    if isinstance(intensity, tuple) and len(intensity) != dim:
+    turns = motion.model == "coordinated-turn"
+    if isinstance(intensity, tuple) and (turns or len(intensity) != dim):
         raise InputError(
             f"motion.{name} has {len(intensity)} numbers, prior.position_m {dim} coordinates",
-            "Give one number, or one per coordinate",
+            "Give one number" if turns else "Give one number, or one per coordinate",
         )
     with at("motion"):
-        return ConstantVelocity(intensity, dim, discrete=discrete)
+        if motion.model == "random-walk":
+            return RandomWalk(intensity, dim)
+        if motion.model == "constant-acceleration":
+            return ConstantAcceleration(intensity, dim)
+        if turns:
+            return CoordinatedTurn(motion.turn_rate_rad_s, intensity, dim)
+        return ConstantVelocity(intensity, dim, discrete=motion.model == "constant-velocity-discrete")
 
 
 def _covariance(spread, dim: int) -> ndarray:
@@ -75,18 +86,19 @@ def _covariance(spread, dim: int) -> ndarray:
 
 
 def build_prior(prior: PriorSection) -> GaussianPrior:
-    """Prior of position and velocity."""
-    n = len(prior.position_m)
-    covariance = np.zeros((2 * n, 2 * n))
+    """Prior of position, velocity and acceleration, as many as there are."""
+    n, means = len(prior.position_m), prior.means
+    covariance = np.zeros((len(means) * n, len(means) * n))
     if prior.covariance is not None:
         covariance[:] = prior.covariance
     else:
-        for name, block in (("position_std_m", slice(0, n)), ("velocity_std_m_s", slice(n, None))):
+        for i, name in enumerate(SPREADS[: len(means)]):
+            block = slice(i * n, (i + 1) * n)
             covariance[block, block] = _covariance(getattr(prior, name), n)
             with at(f"prior.{name}"):
                 GaussianPrior(np.zeros(n), covariance[block, block])
     with at("prior"):
-        return GaussianPrior([*prior.position_m, *prior.velocity_m_s], covariance)
+        return GaussianPrior([x for name in means for x in getattr(prior, name)], covariance)
 
 
 def build_schedule(known, times: Times) -> list[int]:
@@ -133,34 +145,34 @@ def build_sight(sight: SightTable, times: Times) -> Sight:
     return chain
 
 
-def _mixture(noise: NoiseTable) -> tuple[ndarray, ndarray, ndarray]:
-    if noise.weights is not None:
-        return np.asarray(noise.weights), np.asarray(noise.means_m), np.asarray(noise.stds_m)
-    return np.ones(1), np.array([noise.mean_m or 0.0]), np.array([noise.std_m])
+def build_noise(table: NoiseTable) -> Noise:
+    """The law that one noise table describes."""
+    if table.sum is not None:
+        return reduce(add, map(build_noise, table.sum))
+    if table.mixture is not None:
+        return Mixture([part.share for part in table.mixture], [build_noise(part) for part in table.mixture])
+    if table.weights is not None:
+        return GaussianMixture(table.weights, table.means_m, table.stds_m)
+    return noise_families.build(table.family or "gaussian", table.laws())
 
 
 def build_noises(los: NoiseTable, nlos: NlosTable, outlier: OutlierTable | None) -> tuple[Noise, Noise]:
     """Noises of LOS and NLOS; an excess on top of LOS is the sum of two independent errors."""
-    shape_los, shape_nlos = _mixture(los), _mixture(nlos)
-    mixed = [los.weights is not None, nlos.weights is not None]
+    laws = build_noise(los), build_noise(nlos)
     if nlos.plus_los:
-        shape_nlos = _sum(shape_los, shape_nlos)
-        mixed[NLOS] = any(mixed)
-    return _noise(*shape_los, outlier, mixed[LOS]), _noise(*shape_nlos, outlier, mixed[NLOS])
+        laws = laws[0], add(laws[0], laws[1])
+    return _with_outliers(laws[0], outlier), _with_outliers(laws[1], outlier)
 
 
-def _sum(a: tuple[ndarray, ndarray, ndarray], b: tuple[ndarray, ndarray, ndarray]) -> tuple[ndarray, ndarray, ndarray]:
-    """Mixture of the sum of two independent errors: every pair of components."""
-    (w0, m0, s0), (w1, m1, s1) = a, b
-    return np.outer(w0, w1).ravel(), np.add.outer(m0, m1).ravel(), np.sqrt(np.add.outer(s0**2, s1**2)).ravel()
-
-
-def _noise(w: ndarray, m: ndarray, s: ndarray, outlier: OutlierTable | None, mixture: bool) -> Noise:
-    if outlier is not None and outlier.share > 0:
-        w = np.append((1 - outlier.share) * w, outlier.share)
-        m, s = np.append(m, outlier.mean_m), np.append(s, outlier.std_m)
-        mixture = True
-    return GaussianMixture(w, m, s) if mixture else Gaussian(m[0], s[0])
+def _with_outliers(noise: Noise, outlier: OutlierTable | None) -> Noise:
+    if outlier is None or outlier.share == 0:
+        return noise
+    if isinstance(noise, Gaussian | GaussianMixture):
+        simple = isinstance(noise, Gaussian)
+        w, m, s = (1.0, noise.mean, noise.std) if simple else (noise.weights, noise.means, noise.stds)
+        w = np.append((1 - outlier.share) * np.asarray(w), outlier.share)
+        return GaussianMixture(w, np.append(m, outlier.mean_m), np.append(s, outlier.std_m))
+    return Mixture([1 - outlier.share, outlier.share], [noise, Gaussian(outlier.mean_m, outlier.std_m)])
 
 
 def _missing(steps: tuple[int, ...] | None, count: int) -> ndarray | None:

@@ -138,8 +138,8 @@ class CsvTable:
         unique: dict[Any, str] = {c: "" if pd.isna(c) else _WHOLE.sub(r"\1", c.strip()) for c in set(cells.tolist())}
         return np.array([unique[c] for c in cells], dtype=object)
 
-    def numbers(self, column: str) -> Float[ndarray, " rows"]:
-        """A column as finite numbers.
+    def numbers(self, column: str, *, empty: bool = False) -> Float[ndarray, " rows"]:
+        """A column as finite numbers; with ``empty``, cells may be empty (NaN).
 
         Raises
         ------
@@ -148,14 +148,16 @@ class CsvTable:
         """
         cells: Any = self._cells[column]
         values = np.asarray(pd.to_numeric(cells, errors="coerce"), dtype=float)
-        bad = np.flatnonzero(~np.isfinite(values))
+        bad = np.flatnonzero(~np.isfinite(values) & ~(pd.isna(cells) if empty else False))
         if bad.size:
             cell = cells[bad[0]]
             shown = "empty" if pd.isna(cell) else f'"{cell}"'
             more = f" (and {bad.size - 1:,} more)" if bad.size > 1 else ""
             raise InputError(
                 f"line {self.lines[bad[0]]} of {self.path.name}, column {column}, is {shown}{more}: not a number",
-                "Correct it, or delete the line: a missing range is a line that is not there",
+                "Correct it, or leave the cell empty"
+                if empty
+                else "Correct it, or delete the line: a missing range is a line that is not there",
             )
         return values
 

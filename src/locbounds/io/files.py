@@ -89,6 +89,13 @@ class OutputFolder:
     force
         Write into a foreign folder too.
 
+    Attributes
+    ----------
+    written
+        Files finished so far.
+    partial
+        Set it before writing what an interrupted command had computed: the files are then called ``partial-NAME``.
+
     Raises
     ------
     InputError
@@ -107,6 +114,7 @@ class OutputFolder:
         self.path = Path(path)
         self.force = force
         self.written: list[Path] = []
+        self.partial = False
         self._made: list[Path] = []
 
     def __enter__(self) -> "OutputFolder":
@@ -146,6 +154,18 @@ class OutputFolder:
 
     def write(self, name: str, save: Callable[[Path], object]) -> None:
         """Write one file with a function of the path, for example ``figure.savefig`` or ``dataset.to_netcdf``."""
-        with atomic_path(self.path / name) as temporary:
+        with self.writing(name) as temporary:
             save(temporary)
-        self.written.append(self.path / name)
+
+    @contextmanager
+    def writing(self, name: str) -> Iterator[Path]:
+        """A path to write one file to, in as many pieces as it takes; it gets its name when the block has ended.
+
+        While :attr:`partial` is set, the name is ``partial-NAME``; the whole file later removes it.
+        """
+        target = self.path / (f"partial-{name}" if self.partial else name)
+        with atomic_path(target) as temporary:
+            yield temporary
+        self.written.append(target)
+        if not self.partial:
+            (self.path / f"partial-{name}").unlink(missing_ok=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,80 +13,26 @@ import pandas as pd
 
 from locbounds.axes import Float, ndarray
 from locbounds.errors import InputError
+from locbounds.fit.clock import Stamped, bursts, estimate_offset
 from locbounds.fit.range_log import RangeLog, Track
 from locbounds.io.csv_table import CsvTable
+from locbounds.io.log_columns import AnchorColumns, LogColumns, TruthColumns
 
 LABELS = {"los": 0, "nlos": 1, "": -1, "unknown": -1}
 """What a label cell may say, in upper or lower case."""
 
+MERGE_HINT = 1.5  # ranges per step below which anchors seem to report one after the other
+MERGE_HINT_RANGES = 100
 OTHER_UNIT = 100.0  # ranges this many times larger than all positions' extent cannot be in the same unit
+OTHER_UNITS = {"millimetres": 1e3, "centimetres": 1e2, "kilometres": 1e-3} | {
+    "microseconds": 1 / 299.792458,
+    "feet or nanoseconds": 3.3,  # 3.281 and 3.336
+    "negative metres": -1.0,
+}
+FEWEST = 5  # ranges of one anchor from which a unit can be told
+AGREES = 0.2  # another unit is meant if the median error shrinks to less than this share with it
 DEGREES_SPREAD = 0.1
 """Positions that differ by less than this over a whole log look like degrees."""
-
-
-@dataclass(frozen=True)
-class RangeColumns:
-    """Column names of the ranges: one line per range."""
-
-    track: str = "track_id"
-    step: str = "step"
-    time: str = "time_s"
-    anchor: str = "anchor_id"
-    range: str = "range_m"
-
-
-@dataclass(frozen=True)
-class AnchorColumns:
-    """Column names of the anchors; ``z`` is optional."""
-
-    anchor: str = "anchor_id"
-    x: str = "x_m"
-    y: str = "y_m"
-    z: str = "z_m"
-
-
-@dataclass(frozen=True)
-class TruthColumns:
-    """Column names of the true positions; ``z`` is optional, ``step`` too if the ranges have times."""
-
-    track: str = "track_id"
-    step: str = "step"
-    time: str = "time_s"
-    x: str = "x_true_m"
-    y: str = "y_true_m"
-    z: str = "z_true_m"
-
-
-@dataclass(frozen=True)
-class LogColumns:
-    """Column names of all files of a log; the defaults are those of the example data.
-
-    Examples
-    --------
-    >>> LogColumns.parse(["ranges.range=dist", "truth.time=t"]).ranges.range
-    'dist'
-    """
-
-    ranges: RangeColumns = RangeColumns()
-    anchors: AnchorColumns = AnchorColumns()
-    truth: TruthColumns = TruthColumns()
-
-    @classmethod
-    def parse(cls, options: list[str] | tuple[str, ...]) -> LogColumns:
-        """From options such as ``ranges.range=dist`` (file, key, column in the file)."""
-        columns = cls()
-        for option in options:
-            key, equals, name = option.partition("=")
-            file, dot, part = key.partition(".")
-            known = [f"{f.name}.{p.name}" for f in fields(cls) for p in fields(getattr(columns, f.name))]
-            if not (equals and dot and name) or key not in known:
-                near = difflib.get_close_matches(key, known, n=1, cutoff=0.3)
-                raise InputError(
-                    f'column mapping "{option}" is not FILE.KEY=COLUMN with a known key',
-                    f"Did you mean {near[0]}=...?" if near else f"Keys: {', '.join(known)}",
-                )
-            columns = replace(columns, **{file: replace(getattr(columns, file), **{part: name})})
-        return columns
 
 
 def read_log(
@@ -96,7 +42,9 @@ def read_log(
     truth: str | Path | None = None,
     columns: LogColumns | None = None,
     select: str | Mapping[str, str] | None = None,
-    time_offset_s: float = 0.0,
+    time_offset_s: float | str = 0.0,
+    merge_s: float = 0.0,
+    every: int = 1,
     labels: str | None = None,
     dim: int | None = None,
 ) -> RangeLog:
@@ -105,15 +53,23 @@ def read_log(
     Parameters
     ----------
     ranges, anchors, truth : path
-        CSV files (also .gz).  Without a column ``track`` everything is one track.
+        CSV files (also .gz).  Without a column ``track`` everything is one track.  Anchors with such a column stand
+        where it says along that track.
     columns : LogColumns
         Column names.
     select : str or mapping
         ``"scene=canteen"``: only these rows, of every file that has the column; several separated by commas.
-    time_offset_s : float
-        Added to the times of the ranges before they are compared with the truth's, s.
+    time_offset_s : float or "auto"
+        Added to the times of the ranges before they are compared with the truth's, s; ``"auto"`` takes the one at which
+        the range errors spread least (see `locbounds.fit.clock.estimate_offset`) and says so in the notes.
+    merge_s : float
+        Ranges of different anchors within this many seconds of the first one make one step, at their mean time; for
+        anchors that report one after the other.  By default every time is a step.
+    every : int
+        Keep the ranges of every so many steps of a track only: 5 for one in five, where successive errors repeat.
     labels : str, optional
-        Column of the ranges that says ``los`` or ``nlos`` (empty: unknown).
+        Column of the ranges, or of the truth, that says ``los`` or ``nlos`` (empty: unknown); that of the truth holds
+        for the ranges nearest in time, or of the same step.
     dim : int, optional
         2 leaves heights out.  Default: 3 if anchors and truth have heights, 2 if neither has.
 
@@ -148,34 +104,24 @@ def read_log(
     selected = _select(tables, select)
     notes: list[str] = []
 
-    names, places = _anchors(tables["anchors"], columns.anchors, tables.get("truth"), columns.truth, dim, notes)
+    names, places, own = _anchors(tables["anchors"], columns.anchors, tables.get("truth"), columns.truth, dim, notes)
     r, c = tables["ranges"], columns.ranges
     r.need(c.anchor, "anchor")
     r.need(c.range, "range")
     timed = c.time in r
-    if not timed:
-        r.need(c.step, "step")
-        if truth is None:
-            raise InputError(
-                f"{r.path.name} has steps but no times, and there is no truth file to look them up",
-                f"Give the truth file, or a column {c.time} in the ranges",
-            )
-        if time_offset_s:
-            raise InputError(
-                f"a time offset of {time_offset_s:g} s was given, but {r.path.name} has no times",
-                f"Leave it out, or give a column {c.time} in the ranges",
-            )
+    _check_clock(r, c, timed, truth, time_offset_s, merge_s)
+    true = _truth(tables.get("truth"), columns.truth, places.shape[1], steps=not timed, notes=notes)
     frame: Any = pd.DataFrame(
         {
             "track": r.text(c.track) if c.track in r else "",
-            "key": r.numbers(c.time if timed else c.step) + (time_offset_s if timed else 0.0),
+            "time": r.numbers(c.time if timed else c.step),
             "anchor": r.text(c.anchor),
             "range": r.numbers(c.range),
-            "sight": _labels(r, labels),
             "line": r.lines,
         }
     )
-    true = _truth(tables.get("truth"), columns.truth, places.shape[1], steps=not timed, notes=notes)
+    in_ranges = labels is not None and (labels in r or true is None)
+    frame["sight"] = _labels(r, labels) if in_ranges else -1
     if selected and true is not None:
         frame = frame[frame["track"].isin(list(true))]
         if frame.empty:
@@ -185,34 +131,181 @@ def read_log(
     silent = [name for name in names if name not in heard]
     if silent:
         notes.append(f"Anchors without any range are left out: {', '.join(silent)}.")
-        places = places[[name in heard for name in names]]
+        kept = [name in heard for name in names]
+        places, own = places[kept], {track: place[kept] for track, place in own.items()}
         names = [name for name in names if name in heard]
     if len(frame) == 1:
         raise InputError("the log has one range", "Give a log of a moving device, with many ranges per anchor")
+    if timed:
+        offset = time_offset_s
+        if isinstance(offset, str):
+            offset = _estimated_offset(frame, names, places, own, true or {}, notes)
+        frame = _as_steps(frame.assign(time=frame["time"] + offset), names, merge_s, notes)
+    if every != 1:
+        frame = _thinned(frame, every, notes)
+    frame = frame.assign(key=frame["time"])
+    if labels is not None and not in_ranges:
+        frame["sight"] = _labels_of_truth(frame, tables["truth"], columns.truth, labels, timed)
     tracks = []
     for name, rows in frame.groupby("track", sort=False):
-        found = _track(str(name), rows, names, None if true is None else true.get(str(name)), timed, r, notes)
+        found = _track(str(name), rows, names, None if true is None else true.get(str(name)), timed, notes)
         if found is not None:
-            tracks.append(found)
+            tracks.append(replace(found, anchors_m=own.get(str(name)) if own else None))
     if not tracks:
         raise InputError("no range has a true position", "Compare track names, steps and times of both files")
     if labels is None:
         tracks = [replace(track, sight=None) for track in tracks]
-    _refuse_other_units(places, tracks)
+    _refuse_other_units(names, places, tracks, notes)
     return RangeLog(tuple(names), places, tuple(tracks), tuple(notes))
 
 
-def _refuse_other_units(places: Float[ndarray, "n space"], tracks: list[Track]) -> None:
-    """Refuse positions and ranges that cannot both be metres: degrees beside metres, or millimetres beside metres."""
+def _check_clock(r: CsvTable, c, timed: bool, truth, time_offset_s: float | str, merge_s: float) -> None:
+    """Refuse clock options that the files cannot serve."""
+    if isinstance(time_offset_s, str) and time_offset_s != "auto":
+        raise InputError(f'the time offset is "{time_offset_s}"', "Give seconds, or auto")
+    if not (np.isfinite(merge_s) and merge_s >= 0):
+        raise InputError(f"ranges within {merge_s} s are to be merged", "Give seconds, zero or more")
+    if timed:
+        if time_offset_s == "auto" and truth is None:
+            raise InputError("a time offset can only be estimated against a truth", "Give the truth file")
+        return
+    r.need(c.step, "step")
+    if truth is None:
+        raise InputError(
+            f"{r.path.name} has steps but no times, and there is no truth file to look them up",
+            f"Give the truth file, or a column {c.time} in the ranges",
+        )
+    for what, value in (("a time offset", time_offset_s), ("a time to merge within", merge_s)):
+        if value:
+            raise InputError(
+                f"{what} of {value} s was given, but {r.path.name} has no times",
+                f"Leave it out, or give a column {c.time} in the ranges",
+            )
+
+
+def _estimated_offset(frame: Any, names: list[str], places, own, true, notes: list[str]) -> float:
+    stamped = []
+    for name, rows in frame.groupby("track", sort=False):
+        if str(name) in true:
+            t, x, _ = true[str(name)]
+            link = pd.Categorical(rows["anchor"], categories=names).codes.astype(int)
+            at = own.get(str(name), places)[link]
+            stamped.append(Stamped(rows["time"].to_numpy(), rows["range"].to_numpy(), at, link, t, x))
+    offset = estimate_offset(stamped)
+    error = f", s.e. {offset.stderr_s:.2g} s" if np.isfinite(offset.stderr_s) else ""
+    each = ", ".join(f"{x:.3f}" for x in offset.by_track_s)
+    notes.append(f"The time offset was estimated as {offset.value_s:.3f} s{error} (by track: {each}).")
+    return offset.value_s
+
+
+def _as_steps(frame: Any, names: list[str], merge_s: float, notes: list[str]) -> Any:
+    """The ranges with the time of their step; bursts within ``merge_s`` make one step."""
+    if not merge_s:
+        times = len(frame.groupby(["track", "time"]))
+        if len(names) > 1 and MERGE_HINT_RANGES <= len(frame) < MERGE_HINT * times:
+            notes.append(
+                f"A step has {len(frame) / times:.1f} ranges of {len(names)} anchors on average: if they report one "
+                "after the other, merge their bursts (--merge S)."
+            )
+        return frame
+    step = np.empty(len(frame), int)
+    first = 0
+    for rows in frame.reset_index(drop=True).groupby("track", sort=False).groups.values():
+        part = frame.iloc[rows]
+        link = pd.Categorical(part["anchor"], categories=names).codes
+        step[rows] = first + bursts(part["time"].to_numpy(), link, merge_s)
+        first = step[rows].max() + 1
+    middle = frame.groupby(step)["time"].transform("mean").to_numpy()
+    short = middle.round(6)  # microseconds, unless that makes two steps one
+    merged = frame.assign(time=short if len(np.unique(short)) == len(np.unique(middle)) else middle)
+    notes.append(f"{len(frame):,} ranges within {merge_s:g} s of each other were merged into {first:,} steps.")
+    return merged
+
+
+def _thinned(frame: Any, every: int, notes: list[str]) -> Any:
+    """One in so many steps of every track."""
+    if every < 1 or int(every) != every:
+        raise InputError(f"every {every} steps are to be kept", "Give a whole number of at least 1")
+    number = frame.groupby("track", sort=False)["time"].rank(method="dense").to_numpy() - 1
+    kept = frame[number % every == 0]
+    notes.append(f"{len(kept):,} of {len(frame):,} ranges were kept: those of one step in {every}.")
+    return kept
+
+
+def _labels_of_truth(frame: Any, table: CsvTable, c: TruthColumns, labels: str, timed: bool) -> ndarray:
+    """Label of the true position that is nearest in time, or of the same step, for every range; -1 where none is."""
+    sight = _labels(table, labels)
+    track = table.text(c.track) if c.track in table else np.full(len(table), "", dtype=object)
+    key = table.numbers(c.time if timed else c.step)
+    found = np.full(len(frame), -1)
+    owner, at = frame["track"].to_numpy(), frame["key"].to_numpy()
+    for name in set(owner.tolist()) & set(track.tolist()):
+        mine, rows = np.flatnonzero(owner == name), np.flatnonzero(track == name)
+        rows = rows[np.argsort(key[rows])]
+        right = np.clip(np.searchsorted(key[rows], at[mine]), 1, max(len(rows) - 1, 1))
+        left = right - 1
+        right = np.minimum(right, len(rows) - 1)
+        near = np.where(at[mine] - key[rows[left]] <= key[rows[right]] - at[mine], left, right)
+        exact = timed | (key[rows[near]] == at[mine])
+        found[mine] = np.where(exact, sight[rows[near]], -1)
+    return found
+
+
+def _refuse_other_units(names: list[str], places: Float[ndarray, "n space"], tracks: list[Track], notes) -> None:
+    """Refuse positions and ranges that cannot both be metres, of any anchor; remark on single odd ranges."""
     everything = np.concatenate([places, *(t.position_m for t in tracks if t.position_m is not None)])
     extent = float(np.ptp(everything, axis=0).max())
-    typical = float(np.nanmedian(np.abs(np.concatenate([t.ranges_m.ravel() for t in tracks]))))
+    ranges = np.concatenate([t.ranges_m for t in tracks])
+    typical = float(np.nanmedian(np.abs(ranges)))
+    remedy = "Convert positions to metres in a local plane and ranges to metres"
+    if all(t.position_m is not None for t in tracks):
+        distance = np.concatenate([_distances(places, t) for t in tracks])
+        for m, name in enumerate(names):
+            there = np.isfinite(ranges[:, m])
+            unit = other_unit(ranges[there, m], distance[there, m]) if there.sum() >= FEWEST else ""
+            if unit:
+                raise InputError(
+                    f"the ranges to anchor {name} look like {unit}: about {np.median(ranges[there, m]):.4g}, where the "
+                    f"true distances are about {np.median(distance[there, m]):.3g} m",
+                    remedy,
+                )
+    elif np.nanmean(ranges < 0) > 0.5:
+        raise InputError("most ranges are negative", "Give distances in metres; check the sign")
     if typical > OTHER_UNIT * extent > 0:
         raise InputError(
             f"ranges are about {typical:.4g} m, but all positions lie within {extent:.3g} m: one of them is not in "
             "metres (positions in degrees? ranges in millimetres?)",
-            "Convert positions to metres in a local plane and ranges to metres",
+            remedy,
         )
+    below, beyond = np.sum(ranges < 0), np.sum(np.abs(ranges) > OTHER_UNIT * extent) if extent > 0 else 0
+    if below:
+        notes.append(
+            f"{below:,} of {np.isfinite(ranges).sum():,} ranges are negative, down to {np.nanmin(ranges):.3g} m; they "
+            "are kept: a device that subtracts a delay gives such ranges close to an anchor."
+        )
+    if beyond:
+        notes.append(
+            f"{beyond:,} ranges are longer than {OTHER_UNIT * extent:.3g} m, {OTHER_UNIT:g} times the extent of all "
+            "positions: are some rows in another unit?"
+        )
+
+
+def _distances(places: Float[ndarray, "n space"], track: Track) -> Float[ndarray, "steps n"]:
+    anchors = places if track.anchors_m is None else track.anchors_m
+    return np.linalg.norm(np.asarray(track.position_m)[1:, None] - anchors, axis=-1)
+
+
+def other_unit(values: Float[ndarray, " n"], distance: Float[ndarray, " n"]) -> str:
+    """The unit in which ranges agree far better with true distances than in metres; empty if in none.
+
+    >>> other_unit(np.array([5000.0, 7100.0]), np.array([5.1, 7.0])), other_unit(np.array([5.3]), np.array([5.0]))
+    ('millimetres', '')
+    """
+    if not len(values):
+        return ""
+    left = {unit: np.median(np.abs(values / factor - distance)) for unit, factor in OTHER_UNITS.items()}
+    best = min(left, key=lambda unit: left[unit])
+    return best if left[best] < AGREES * np.median(np.abs(values - distance)) else ""
 
 
 def _select(tables: Mapping[str, CsvTable], select: str | Mapping[str, str] | None) -> bool:
@@ -254,15 +347,24 @@ def _anchors(table: CsvTable, c: AnchorColumns, truth: CsvTable | None, tc: Trut
     use = (3 if all(heights) else 2) if dim is None else dim
     if use == 3:
         table.need(c.z, "z")
-    names = table.text(c.anchor).tolist()
-    twice = [name for i, name in enumerate(names) if name in names[:i]]
-    if twice:
-        others = [n for n in table.names if n not in (c.anchor, c.x, c.y, c.z)]
-        remedy = f"Choose one with --select {others[0]}=VALUE" if others else "Give every anchor its own name"
-        raise InputError(f"anchor {twice[0]} is in {table.path.name} more than once", remedy)
+    column = table.text(c.anchor)
     places = table.positions((c.x, c.y, c.z)[:use])
     _note_degrees(table, (c.x, c.y), places, notes)
-    return names, places
+    names = list(dict.fromkeys(column.tolist()))
+    track = table.text(c.track) if c.track in table else np.full(len(table), "", dtype=object)
+    twice = pd.DataFrame({"track": track, "anchor": column}).duplicated().to_numpy()
+    if twice.any():
+        others = [n for n in table.names if n not in (c.anchor, c.x, c.y, c.z)]
+        remedy = f"Choose one with --select {others[0]}=VALUE" if others else "Give every anchor its own name"
+        raise InputError(f"anchor {column[twice][0]} is in {table.path.name} more than once", remedy)
+    first = np.stack([places[column == name][0] for name in names])
+    own = {}
+    for t in dict.fromkeys(track.tolist()) if c.track in table else ():
+        mine = {name: place for name, place, of in zip(column, places, track, strict=True) if of == t}
+        own[str(t)] = np.stack([mine.get(name, place) for name, place in zip(names, first, strict=True)])
+    if all(np.array_equal(place, first) for place in own.values()):
+        own = {}
+    return names, first, own
 
 
 def _note_degrees(table: CsvTable, columns: tuple[str, str], places: Float[ndarray, "n space"], notes) -> None:
@@ -331,7 +433,7 @@ def _check_rows(frame: Any, names: list[str], table: CsvTable, anchors: str | Pa
             f"{Path(anchors).name}",
             f"Add its position; the anchors there are {', '.join(names[:12])}{', ...' if len(names) > 12 else ''}",
         )
-    twice = frame[frame.duplicated(["track", "key", "anchor"])]
+    twice = frame[frame.duplicated(["track", "time", "anchor"])]
     if len(twice):
         row = twice.iloc[0]
         raise InputError(
@@ -340,14 +442,14 @@ def _check_rows(frame: Any, names: list[str], table: CsvTable, anchors: str | Pa
             "Delete one of them",
         )
     if timed:
-        back = frame[frame.groupby("track", sort=False)["key"].diff() < 0]
+        back = frame[frame.groupby("track", sort=False)["time"].diff() < 0]
         if len(back):
             raise InputError(
                 f"line {back.iloc[0]['line']} of {table.path.name} goes back in time", "Sort each track by time"
             )
 
 
-def _track(name: str, rows: Any, names: list[str], true, timed: bool, table: CsvTable, notes) -> Track | None:
+def _track(name: str, rows: Any, names: list[str], true, timed: bool, notes) -> Track | None:
     shown = name or "1"
     if true is None and timed:
         key = np.unique(rows["key"].to_numpy())
@@ -378,4 +480,5 @@ def _track(name: str, rows: Any, names: list[str], true, timed: bool, table: Csv
     z, sight = np.full((len(key), len(names)), np.nan), np.full((len(key), len(names)), -1)
     z[at[there], link[there]] = rows["range"].to_numpy()[there]
     sight[at[there], link[there]] = rows["sight"].to_numpy()[there]
-    return Track(shown, time, z[1:], places, sight[1:])
+    raw = (true[0], true[1]) if timed and true is not None else (None, None)
+    return Track(shown, time, z[1:], places, sight[1:], None, *raw)

@@ -4,10 +4,12 @@ Every key carries its unit and one line that teaches it; the same line is the re
 comment in written files. A wrong unit is an unknown key with a suggestion.
 """
 
+from difflib import get_close_matches
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from locbounds.io.noise_families import EVERY_KEY, FAMILIES, MADE_OF, PLAIN
 from locbounds.io.values import (
     ROUNDING,
     Chain,
@@ -68,21 +70,46 @@ class TimeSection(Section):
         return self
 
 
+MOTION_KEYS = {
+    "constant-velocity": ("psd_m2_s3",),
+    "constant-velocity-discrete": ("acceleration_var_m2_s4",),
+    "random-walk": ("diffusion_m2_s",),
+    "constant-acceleration": ("jerk_psd_m2_s5",),
+    "coordinated-turn": ("psd_m2_s3", "turn_rate_rad_s"),
+}
+DERIVATIVES = ("position_m", "velocity_m_s", "acceleration_m_s2")  # of the prior, as many as the motion's state has
+SPREADS = ("position_std_m", "velocity_std_m_s", "acceleration_std_m_s2")
+ORDER = {"random-walk": 1, "constant-acceleration": 3}  # how many of them; 2 for all others
+
+
 class MotionSection(Section):
     """How the mobile moves."""
 
-    model: Literal["constant-velocity", "constant-velocity-discrete"] = needed(
-        '"constant-velocity" (continuous white acceleration) or "constant-velocity-discrete" (constant during a step)'
+    model: Literal[
+        "constant-velocity",
+        "constant-velocity-discrete",
+        "random-walk",
+        "constant-acceleration",
+        "coordinated-turn",
+    ] = needed(
+        '"constant-velocity" (white acceleration), "constant-velocity-discrete" (constant during a step), '
+        '"random-walk", "constant-acceleration" (white jerk) or "coordinated-turn" (known turn rate)'
     )
     psd_m2_s3: PerAxis | None = key("power spectral density of the acceleration, a number or one per axis")
     acceleration_var_m2_s4: PerAxis | None = key("variance of the acceleration of each step, a number or one per axis")
+    diffusion_m2_s: PerAxis | None = key("variance of the displacement per second, a number or one per axis")
+    jerk_psd_m2_s5: PerAxis | None = key("power spectral density of the jerk, a number or one per axis")
+    turn_rate_rad_s: Number | None = key("turn rate, positive to the left")
 
     @model_validator(mode="after")
     def _matching_intensity(self):
-        wanted = "psd_m2_s3" if self.model == "constant-velocity" else "acceleration_var_m2_s4"
-        if self.given("psd_m2_s3", "acceleration_var_m2_s4") != [wanted]:
-            given = ", ".join(self.given("psd_m2_s3", "acceleration_var_m2_s4")) or "no intensity"
-            raise fail(f'has model = "{self.model}" with {given}', f"This model takes {wanted} and nothing else")
+        wanted = list(MOTION_KEYS[self.model])
+        given = self.given(*dict.fromkeys(name for names in MOTION_KEYS.values() for name in names))
+        if given != wanted:
+            raise fail(
+                f'has model = "{self.model}" with {", ".join(given) or "no intensity"}',
+                f"This model takes {' and '.join(wanted)} and nothing else",
+            )
         return self
 
 
@@ -91,26 +118,45 @@ class PriorSection(Section):
 
     position_m: Point = needed("mean position at step 0, for example position_m = [500, 500]; three numbers for 3-D")
     position_std_m: Spread | None = key("a number, one per axis, or a covariance matrix in m^2")
-    velocity_m_s: Point = needed("mean velocity at step 0, for example velocity_m_s = [5, 5]")
+    velocity_m_s: Point | None = key("mean velocity at step 0, for example velocity_m_s = [5, 5]")
     velocity_std_m_s: Spread | None = key("a number, one per axis, or a covariance matrix in (m/s)^2")
-    covariance: Matrix | None = key("instead of both deviations: covariance of position and velocity, in m and m/s")
+    acceleration_m_s2: Point | None = key("mean acceleration at step 0, for model = constant-acceleration")
+    acceleration_std_m_s2: Spread | None = key("a number, one per axis, or a covariance matrix in (m/s^2)^2")
+    covariance: Matrix | None = key("instead of the deviations: covariance of position and velocity, in m and m/s")
+
+    @property
+    def means(self) -> list[str]:
+        """Which of position, velocity and acceleration the file has."""
+        return self.given(*DERIVATIVES)
 
     @model_validator(mode="after")
     def _fits(self):
-        n = len(self.position_m)
-        if len(self.velocity_m_s) != n:
-            raise fail(f"has {n} position and {len(self.velocity_m_s)} velocity coordinates", "Give as many of each")
+        n, means = len(self.position_m), self.means
+        if means != list(DERIVATIVES[: len(means)]):
+            raise fail("has acceleration_m_s2 without velocity_m_s", "Give position, velocity and acceleration")
+        for name in means:
+            if len(getattr(self, name)) != n:
+                word = name.split("_")[0]
+                raise fail(
+                    f"has {n} position and {len(getattr(self, name))} {word} coordinates", "Give as many of each"
+                )
+        spreads = SPREADS[: len(means)]
+        for name in self.given(*SPREADS[len(means) :]):
+            raise fail(f"has {name} without {DERIVATIVES[SPREADS.index(name)]}", "Give both or neither")
         if self.covariance is None:
-            for name in ("position_std_m", "velocity_std_m_s"):
+            for name in spreads:
                 value = getattr(self, name)
                 if value is None:
                     raise fail(f"has no {name}", f"Add {name}: {type(self).model_fields[name].description}")
                 if isinstance(value, tuple) and len(value) != n:
                     raise fail(f"has {n} coordinates, but {name} has {len(value)}", "Give one per coordinate")
-        elif self.given("position_std_m", "velocity_std_m_s"):
+        elif self.given(*spreads):
             raise fail("has both a covariance and deviations", "Keep one of them")
-        elif len(self.covariance) != 2 * n:
-            raise fail(f"has a covariance of {len(self.covariance)} rows", f"Give {2 * n}: positions, then velocities")
+        elif len(self.covariance) != len(means) * n:
+            raise fail(
+                f"has a covariance of {len(self.covariance)} rows",
+                f"Give {len(means) * n}: {', then '.join(name.split('_')[0] for name in means)}",
+            )
         return self
 
 
@@ -143,28 +189,97 @@ class NoiseTable(Section):
     weights: Positives | None = key("shares of a Gaussian mixture, summing to one, with means_m and stds_m")
     means_m: Numbers | None = key("means of the mixture's components")
     stds_m: Positives | None = key("standard deviations of the mixture's components")
+    family: Text | None = key(f"law of the error, gaussian if left out: {', '.join(FAMILIES)}")
+    center_m: Number | None = key("centre of the law, or of its Gaussian part, in metres; 0 if left out")
+    scale_m: Positive | None = key("scale of an exponential, Laplace, gamma or Student t law in metres, positive")
+    start_m: Number | None = key("smallest value of a one-sided law in metres; 0 if left out")
+    low_m: Number | None = key("lower limit in metres")
+    high_m: Number | None = key("upper limit in metres")
+    shape: Positive | None = key("shape of a gamma law, positive; 1 is exponential")
+    degrees: Positive | None = key("degrees of freedom of a Student t law, positive")
+    median_m: Positive | None = key("median of a log-normal law above start_m, in metres, positive")
+    log_std: Positive | None = key("standard deviation of the logarithm of a log-normal law, positive")
+    sum: tuple["NoiseTable", ...] | None = key("independent errors that add, [{ std_m = 1 }, { family = .. }]")
+    mixture: tuple["NoiseTable", ...] | None = key("one of several errors, [{ share = 0.9, std_m = 1 }, { .. }]")
+    share: Probability | None = key("share of this law in a mixture")
 
     @model_validator(mode="after")
     def _one_way(self):
-        mixture = self.given("weights", "means_m", "stds_m")
-        if mixture and (len(mixture) < 3 or self.given("mean_m", "std_m")):
-            raise fail(
-                f"has {', '.join(self.given('mean_m', 'std_m') + mixture)}",
-                "Give std_m (and mean_m), or weights, means_m and stds_m",
-            )
-        if not mixture and self.std_m is None:
-            raise fail("has no std_m", f"Add std_m: {NoiseTable.model_fields['std_m'].description}")
-        if mixture and not len(self.weights or ()) == len(self.means_m or ()) == len(self.stds_m or ()):
-            raise fail("has weights, means_m and stds_m of different lengths", "Give one of each per component")
-        if mixture and abs(sum(self.weights or ()) - 1) > ROUNDING:
-            raise fail(f"has weights that sum to {sum(self.weights or ()):.6g}", "Weights must sum to one")
+        check_noise_keys(self)
         return self
+
+    def laws(self) -> dict[str, Any]:
+        """The keys that belong to families, with their values."""
+        return {name: getattr(self, name) for name in EVERY_KEY}
+
+
+def check_noise_keys(table: NoiseTable) -> None:
+    """Raise unless the keys of a noise table describe one law."""
+    made_of, mixture = table.given(*MADE_OF), table.given(*PLAIN)
+    single = table.given(*EVERY_KEY)
+    if made_of:
+        extra = made_of[1:] + table.given("family") + mixture + single
+        if extra:
+            raise fail(f"has {made_of[0]} and {', '.join(extra)}", f"Keep {made_of[0]}, or the others")
+        return check_parts(table)
+    if table.family is not None:
+        return check_family(table, table.family, mixture + single)
+    strange = [name for name in single if name not in FAMILIES["gaussian"].keys]
+    if strange:
+        fits = [f for f, family in FAMILIES.items() if set(single) <= set(family.keys)] or list(FAMILIES)
+        raise fail(f"has {', '.join(strange)} but no family", f"Add family, one of: {', '.join(fits)}")
+    if mixture and (len(mixture) < 3 or single):
+        raise fail(
+            f"has {', '.join(table.given('mean_m', 'std_m') + mixture)}",
+            "Give std_m (and mean_m), or weights, means_m and stds_m",
+        )
+    if not mixture and table.std_m is None:
+        raise fail("has no std_m", f"Add std_m: {NoiseTable.model_fields['std_m'].description}")
+    if mixture and not len(table.weights or ()) == len(table.means_m or ()) == len(table.stds_m or ()):
+        raise fail("has weights, means_m and stds_m of different lengths", "Give one of each per component")
+    if mixture and abs(sum(table.weights or ()) - 1) > ROUNDING:
+        raise fail(f"has weights that sum to {sum(table.weights or ()):.6g}", "Weights must sum to one")
+    return None
+
+
+def check_family(table: NoiseTable, family: str, given: list[str]) -> None:
+    """Raise unless the keys are those of the family."""
+    if family not in FAMILIES:
+        near = get_close_matches(family.lower().replace("_", "-"), FAMILIES, n=1, cutoff=0.4)
+        hint = f"Did you mean {near[0]}? " if near else ""
+        raise fail(f"has the unknown family {family!r}", f"{hint}Known: {', '.join(FAMILIES)}")
+    keys = FAMILIES[family].keys
+    strange = [name for name in given if name not in keys]
+    missing = [name for name in FAMILIES[family].needed if name not in given]
+    if strange:
+        near = get_close_matches(strange[0], missing or list(keys), n=1, cutoff=0.3)
+        hint = f"Did you mean {near[0]}? " if near else ""
+        raise fail(f'has {strange[0]}, which family = "{family}" does not take', f"{hint}It takes: {', '.join(keys)}")
+    if missing:
+        teaching = NoiseTable.model_fields[missing[0]].description
+        raise fail(f'has family = "{family}" but no {missing[0]}', f"Add {missing[0]}: {teaching}")
+
+
+def check_parts(table: NoiseTable) -> None:
+    """Raise unless a sum has parts, and a mixture shares that sum to one."""
+    if table.sum is not None:
+        if len(table.sum) < 2:
+            raise fail(f"has a sum of {len(table.sum)} errors", "Give at least two, [{ std_m = 1 }, { .. }]")
+        if any(part.share is not None for part in table.sum):
+            raise fail("has share in a sum", "Shares belong to a mixture; the errors of a sum all add")
+        return
+    shares = [part.share for part in table.mixture or ()]
+    if not shares or None in shares:
+        raise fail("has a mixture with a law without share", "Give every law of the mixture its share")
+    total = sum(share or 0.0 for share in shares)
+    if min(share or 0.0 for share in shares) == 0 or abs(total - 1) > ROUNDING:
+        raise fail(f"has a mixture whose shares are {shares}", "Give positive shares that sum to one")
 
 
 class NlosTable(NoiseTable):
     """Noise of a range in NLOS."""
 
-    plus_los: bool = Field(False, strict=True, description="true: mean_m and std_m are the excess on top of LOS noise")
+    plus_los: bool = Field(False, strict=True, description="true: this is the excess on top of LOS noise")
 
 
 class OutlierTable(Section):
@@ -211,3 +326,20 @@ class ScenarioFile(Section):
     anchors: dict[str, AnchorTable] = Field(
         {}, description="a section [anchors], a line NAME = { position_m = [..] } each"
     )
+
+    @model_validator(mode="after")
+    def _prior_of_the_motion(self):
+        wanted = DERIVATIVES[: ORDER.get(self.motion.model, 2)]
+        missing, extra = set(wanted) - set(self.prior.means), set(self.prior.means) - set(wanted)
+        for name in (d for d in DERIVATIVES if d in missing):
+            raise fail(
+                f'prior has no {name}, which motion.model = "{self.motion.model}" needs',
+                f"Add {name}: {PriorSection.model_fields[name].description}",
+            )
+        if extra:
+            raise fail(
+                f"prior has {', '.join(d for d in DERIVATIVES if d in extra)}, which "
+                f'motion.model = "{self.motion.model}" does not know',
+                "Remove it and its deviation, or choose another model",
+            )
+        return self

@@ -1,5 +1,6 @@
 """From a scenario to the keys of a scenario file: the plainest keys that read back to exactly the same numbers."""
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -9,8 +10,12 @@ import numpy as np
 
 from locbounds.errors import InputError
 from locbounds.io import build
+from locbounds.io.noise_families import FAMILIES, family_of
 from locbounds.io.schema import (
+    DERIVATIVES,
     FORMAT,
+    MOTION_KEYS,
+    SPREADS,
     NlosTable,
     NoiseTable,
     OutlierTable,
@@ -18,8 +23,9 @@ from locbounds.io.schema import (
     SightTable,
     TimeSection,
 )
-from locbounds.motion import ConstantVelocity
-from locbounds.noise import Gaussian, GaussianMixture, Noise
+from locbounds.measurement import BySight
+from locbounds.motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, RandomWalk
+from locbounds.noise import ExponentiallyModifiedGaussian, Gaussian, GaussianMixture, Mixture, Noise, Sum
 from locbounds.priors import GaussianPrior
 from locbounds.scenario import Link, Scenario
 from locbounds.sight import DwellSight, KnownSight, MarkovSight, Sight
@@ -79,13 +85,20 @@ def time_keys(times: Times) -> dict:
 
 def motion_keys(motion: Any) -> dict:
     """Name and intensity of the motion model."""
-    if type(motion) is not ConstantVelocity:
+    names = {
+        ConstantVelocity: "constant-velocity",
+        RandomWalk: "random-walk",
+        ConstantAcceleration: "constant-acceleration",
+        CoordinatedTurn: "coordinated-turn",
+    }
+    if type(motion) not in names:
         raise _cannot(f"the motion model {type(motion).__name__}")
-    q = motion.intensity
-    intensity = plain(q[0] if np.all(q == q[0]) else q)
-    if motion.discrete:
-        return {"model": "constant-velocity-discrete", "acceleration_var_m2_s4": intensity}
-    return {"model": "constant-velocity", "psd_m2_s3": intensity}
+    name = names[type(motion)]
+    if isinstance(motion, ConstantVelocity) and motion.discrete:
+        name = "constant-velocity-discrete"
+    q = np.atleast_1d(motion.intensity)
+    keys = {"model": name, MOTION_KEYS[name][0]: plain(q[0] if np.all(q == q[0]) else q)}
+    return keys | ({"turn_rate_rad_s": plain(motion.rate_rad_s)} if isinstance(motion, CoordinatedTurn) else {})
 
 
 def _spreads(covariance: Any) -> list:
@@ -94,21 +107,15 @@ def _spreads(covariance: Any) -> list:
     return [plain(deviations[0]), plain(deviations), plain(covariance)]
 
 
-def prior_keys(prior: GaussianPrior) -> dict:
+def prior_keys(prior: GaussianPrior, dim: int) -> dict:
     """Means and deviations, or the whole covariance."""
-    n = len(prior.mean) // 2
-    means = {"position_m": plain(prior.mean[:n]), "velocity_m_s": plain(prior.mean[n:])}
-    blocks = (_spreads(prior.covariance[:n, :n]), _spreads(prior.covariance[n:, n:]))
-    candidates = [
-        {
-            "position_m": means["position_m"],
-            "position_std_m": p,
-            "velocity_m_s": means["velocity_m_s"],
-            "velocity_std_m_s": v,
-        }
-        for p in blocks[0]
-        for v in blocks[1]
-    ]
+    order = len(prior.mean) // dim
+    blocks = [slice(i * dim, (i + 1) * dim) for i in range(order)]
+    means = {name: plain(prior.mean[block]) for name, block in zip(DERIVATIVES, blocks, strict=False)}
+    candidates = []
+    for choice in itertools.product(*[_spreads(prior.covariance[block, block]) for block in blocks]):
+        pairs = zip(means.items(), zip(SPREADS, choice, strict=False), strict=True)
+        candidates.append(dict(item for pair in pairs for item in pair))
     candidates.append(means | {"covariance": plain(prior.covariance)})
     found = _first(candidates, lambda keys: build.build_prior(PriorSection.model_validate(keys)), prior)
     assert found is not None
@@ -142,13 +149,29 @@ def sight_keys(sight: Sight, times: Times) -> dict:
 def _noise_table(noise: Noise) -> dict:
     if isinstance(noise, GaussianMixture):
         return {"weights": plain(noise.weights), "means_m": plain(noise.means), "stds_m": plain(noise.stds)}
-    if not isinstance(noise, Gaussian):
+    if isinstance(noise, Sum):
+        return {"sum": [_noise_table(noise.first), _noise_table(noise.second)]}
+    if isinstance(noise, Mixture):
+        shares = zip(plain(noise.weights), noise.parts, strict=True)
+        return {"mixture": [{"share": share, **_noise_table(part)} for share, part in shares]}
+    family = family_of(noise)
+    if family is None:
         raise _cannot(f"the noise {type(noise).__name__}")
-    mean = {"mean_m": plain(noise.mean)} if noise.mean != 0 else {}
-    return {**mean, "std_m": plain(noise.std)}
+    table = {} if family == "gaussian" else {"family": family}
+    for name, argument in FAMILIES[family].keys.items():
+        value = getattr(noise, argument)
+        left_out = name in FAMILIES[family].optional and (value == 0 or not np.isfinite(value))
+        if not left_out or (value == 0 and name in ("low_m", "high_m")):
+            table[name] = plain(value)
+    return table if family != "gaussian" else dict(sorted(table.items()))
 
 
 def _as_excess(los: Noise, nlos: Noise) -> dict | None:
+    if isinstance(nlos, Sum):
+        return {"plus_los": True, **_noise_table(nlos.second)}
+    if isinstance(los, Gaussian) and isinstance(nlos, ExponentiallyModifiedGaussian):
+        start = {"start_m": plain(nlos.center - los.mean)} if nlos.center != los.mean else {}
+        return {"plus_los": True, "family": "exponential", "scale_m": plain(nlos.scale), **start}
     if not isinstance(los, Gaussian) or not isinstance(nlos, Gaussian) or nlos.std <= los.std:
         return None
     mean, std = nlos.mean - los.mean, np.sqrt(nlos.std**2 - los.std**2)
@@ -191,6 +214,10 @@ def link_keys(link: Link, times: Times) -> dict:
     """All keys of one link except its position."""
     if len(link.noises) != 2:
         raise _cannot(f"anchor {link.name} with {len(link.noises)} sight conditions")
+    if isinstance(link.measurement, BySight):
+        raise _cannot(f"the measurement of anchor {link.name}, which depends on the sight,")
+    if link.chain is not None:
+        raise _cannot(f"the chain {link.chain} that anchor {link.name} shares")
     keys = {"measure": "range", "sight": sight_keys(link.sight, times), **noise_keys(*link.noises)}
     if link.reports is not None:
         keys["missing_steps"] = (np.flatnonzero(~np.asarray(link.reports, dtype=bool)) + 1).tolist()
@@ -228,7 +255,7 @@ def file_keys(scenario: Scenario) -> dict[str, Any]:
         "title": scenario.title,
         "time": time_keys(scenario.times),
         "motion": motion_keys(scenario.motion),
-        "prior": prior_keys(scenario.prior),
+        "prior": prior_keys(scenario.prior, scenario.dim),
         "links": shared,
         "anchors": anchors,
     }

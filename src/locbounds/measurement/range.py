@@ -41,6 +41,10 @@ class Range(eqx.Module):
         if self.anchor.shape not in ((2,), (3,)) or not np.all(np.isfinite(self.anchor)):
             raise InputError(f"anchor position is {self.anchor}", "Give 2 or 3 finite coordinates in metres")
 
+    def under(self, mode: int) -> "Range":
+        """The measurement under one sight condition: itself."""
+        return self
+
     def __call__(self, position: Float[Array, " space"]) -> Scalar:
         square = jnp.sum((position - self.anchor) ** 2, axis=-1)
         safe = jnp.where(square > 0, square, 1.0)

@@ -3,6 +3,8 @@
 from abc import abstractmethod
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 
 from locbounds.axes import Array, Float, Scalar
 
@@ -30,6 +32,14 @@ class Motion(eqx.Module):
     @abstractmethod
     def covariance(self, dt: Scalar) -> Float[Array, "state state"]:
         """Q for an interval of ``dt`` seconds."""
+
+    def transitions(self, intervals: Float[Array, " steps"]) -> Float[Array, "steps state state"]:
+        """F of every step, given the intervals in seconds."""
+        return jax.vmap(self.transition)(jnp.asarray(intervals))
+
+    def covariances(self, intervals: Float[Array, " steps"]) -> Float[Array, "steps state state"]:
+        """Q of every step, given the intervals in seconds."""
+        return jax.vmap(self.covariance)(jnp.asarray(intervals))
 
     @property
     def state_size(self) -> int:

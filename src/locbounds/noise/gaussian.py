@@ -4,10 +4,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.scipy.special import ndtr, ndtri
 
 from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError
-from locbounds.noise.base import Noise, Regularity
+from locbounds.noise.base import Noise
+from locbounds.noise.regularity import Regularity
+from locbounds.noise.singularity import Singularity
 from locbounds.precision import float64, traced
 
 
@@ -56,8 +59,17 @@ class Gaussian(Noise):
     def information(self) -> Scalar:
         return 1.0 / self.std**2
 
+    def cdf(self, w: Float[Array, "*n"]) -> Float[Array, "*n"]:
+        return ndtr((jnp.asarray(w) - self.mean) / self.std)
+
+    def quantile(self, q: Float[Array, "*n"]) -> Float[Array, "*n"]:
+        return self.mean + self.std * ndtri(jnp.asarray(q))
+
     def components(self) -> tuple[Float[Array, " c"], Float[Array, " c"], Float[Array, " c"]]:
         return jnp.ones(1), jnp.reshape(self.mean, 1), jnp.reshape(self.variance, 1)
+
+    def singularities(self) -> tuple[Singularity, ...]:
+        return ()
 
     def regularity(self) -> Regularity:
         return Regularity(True, "Gaussian density: smooth on the whole line")

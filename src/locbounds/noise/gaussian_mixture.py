@@ -8,7 +8,9 @@ from jax.scipy.special import logsumexp, ndtr
 
 from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError
-from locbounds.noise.base import Noise, Regularity
+from locbounds.noise.base import BREAKS, Noise
+from locbounds.noise.regularity import Regularity
+from locbounds.noise.singularity import Singularity
 from locbounds.precision import float64, traced
 
 _BREAKS = np.array([-10, -8, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6, 8, 10.0])  # in deviations of a component
@@ -99,6 +101,12 @@ class GaussianMixture(Noise):
         w = jnp.asarray(self.means)[c] + jnp.asarray(self.stds)[c] * jax.random.normal(draw, shape)
         return _quantile(jax.lax.stop_gradient(w), *map(jnp.asarray, (self.weights, self.means, self.stds)))
 
+    def landmarks(self) -> Float[Array, " k"]:
+        return jnp.sort((jnp.asarray(self.means)[:, None] + jnp.asarray(self.stds)[:, None] * BREAKS).ravel())
+
+    def cdf(self, w: Float[Array, "*n"]) -> Float[Array, "*n"]:
+        return jnp.sum(self.weights * ndtr((jnp.asarray(w)[..., None] - self.means) / self.stds), -1)
+
     def information(self) -> Scalar:
         edges = jnp.sort((self.means[:, None] + self.stds[:, None] * _BREAKS).ravel())
         half = 0.5 * jnp.diff(edges)
@@ -107,6 +115,9 @@ class GaussianMixture(Noise):
 
     def components(self) -> tuple[Float[Array, " c"], Float[Array, " c"], Float[Array, " c"]]:
         return jnp.asarray(self.weights), jnp.asarray(self.means), jnp.asarray(self.stds) ** 2
+
+    def singularities(self) -> tuple[Singularity, ...]:
+        return ()
 
     def regularity(self) -> Regularity:
         return Regularity(True, "mixture of Gaussian densities: smooth on the whole line")

@@ -6,6 +6,7 @@ environments", IEEE Wireless Communications Letters, 2013.
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -76,6 +77,10 @@ REMARKS = (
 )
 
 
+class Stopped(Exception):  # noqa: N818 - not an error: nobody waits for the column any more
+    """Ends a column of the study whose consumer has gone."""
+
+
 class Cell(NamedTuple):
     """One entry of Table I: published, computed and its standard error, in metres."""
 
@@ -112,7 +117,16 @@ def study(
     >>> stay, [r.name for r in results]
     (0.6, ['IMM-KF', 'IMM-EKF', 'BCRB', 'Enumer-BCRB'])
     """
-    say = announce or (lambda what: None)
+    stopped = Event()  # after Ctrl-C running columns end at their next piece of work, not at their own end
+
+    def go_on(*_: object) -> None:
+        if stopped.is_set():
+            raise Stopped
+
+    def say(what: str) -> None:
+        go_on()
+        if announce is not None:
+            announce(what)
 
     def filters(stay: float) -> list[Result]:
         model = scenario(stay)
@@ -121,20 +135,22 @@ def study(
         results = []
         for filter in (ImmKf(covariance=False), ImmEkf(covariance=False)):
             say(f"stay {stay}: {filter.name}")
-            results.append(evaluate_on(filter, model, draws, seed=seed))
+            results.append(evaluate_on(filter, model, draws, seed=seed, progress=go_on))
         return results
 
     def bounds(stay: float) -> list[Result]:
+        go_on()
         model = scenario(stay)
-        return [bound(model, samples=samples, seed=seed) for bound in (bcrb, enumer)]
+        return [bound(model, samples=samples, seed=seed, progress=go_on) for bound in (bcrb, enumer)]
 
-    with ThreadPoolExecutor(1) as pool:  # bounds beside filters: no kernel is compiled twice
-        beside = [pool.submit(bounds, stay) for stay in STAY]
-        try:
-            for stay, later in zip(STAY, beside, strict=True):
-                yield stay, [*filters(stay), *later.result()]
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    pool = ThreadPoolExecutor(1)  # bounds beside filters: no kernel is compiled twice
+    beside = [pool.submit(bounds, stay) for stay in STAY]
+    try:
+        for stay, later in zip(STAY, beside, strict=True):
+            yield stay, [*filters(stay), *later.result()]
+    finally:
+        stopped.set()
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def table1(columns: list[tuple[float, list[Result]]]) -> list[Cell]:

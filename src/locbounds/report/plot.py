@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from locbounds.errors import InputError
 from locbounds.result import Result
 
 if TYPE_CHECKING:
@@ -43,6 +44,11 @@ def rmse(results: Sequence[Result] | Result, *, title: str = "", against: str = 
     against
         ``"time"`` in seconds or ``"step"``.
 
+    Raises
+    ------
+    InputError
+        If there is no result.
+
     Examples
     --------
     >>> import locbounds as lb
@@ -52,9 +58,14 @@ def rmse(results: Sequence[Result] | Result, *, title: str = "", against: str = 
     """
     from matplotlib.figure import Figure
 
+    results = [results] if isinstance(results, Result) else list(results)
+    if not results:
+        raise InputError("there is nothing to draw", "Give at least one result of a bound or a filter")
+    if against not in ("time", "step"):
+        raise InputError(f"the error is to be drawn against {against!r}", 'Choose "time" or "step"')
     figure = Figure(figsize=(7.0, 4.8), layout="constrained")
     axes = figure.subplots()
-    for k, result in enumerate([results] if isinstance(results, Result) else results):
+    for k, result in enumerate(results):
         t = result.time_s if against == "time" else np.arange(len(result.time_s))
         middle, error = result.position_rmse.values, result.position_rmse_stderr.values
         style = {"ls": "-", "lw": 1.8} if result.kind == "bound" else {"ls": "--", "lw": 1.3}

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from locbounds.axes import LOS, NLOS
-from locbounds.noise import Gaussian, Noise
-from locbounds.registry import METHODS
+from locbounds.motion import ConstantAcceleration, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
+from locbounds.noise import Gaussian, GaussianMixture, Noise, Sum
+from locbounds.registry import bounds_of
 from locbounds.scenario import Link, Scenario
 from locbounds.sight import DwellSight, KnownSight, MarkovSight, Sight
 from locbounds.verdict import dangers
@@ -38,7 +39,7 @@ def understood(scenario: Scenario) -> dict[str, Any]:
     >>> seen["links"][0]["NLOS error"]
     'mean 513 m, deviation 435.639 m'
     """
-    verdicts = {m.id: m.verdict(scenario) for m in METHODS.values() if m.kind == "bound"}
+    verdicts = {m.id: m.verdict(scenario) for m in bounds_of("scenario")}
     return {
         "title": scenario.title,
         "model": {"time": _time(scenario), "motion": _motion(scenario), "prior": _prior(scenario)},
@@ -74,26 +75,49 @@ def _time(scenario: Scenario) -> str:
 def _motion(scenario: Scenario) -> str:
     motion: Any = scenario.motion
     dt = float(np.mean(scenario.times.intervals))
+    where = f"in {scenario.dim}-D"
+    if isinstance(motion, SwitchingMotion):
+        kinds = ", ".join(type(m).__name__ for m in motion.motions)
+        return f"switches {where} between {len(motion.motions)} motions ({kinds}); chain: {_sight(motion.sight)}"
+    if isinstance(motion, LinearMotion):
+        return f"linear {where}, its own matrices at every step, state {', '.join(motion.state_names)}"
     q = np.max(motion.intensity)
+    number = _numbers(np.atleast_1d(motion.intensity))
+    if isinstance(motion, RandomWalk):
+        return f"random walk {where}, diffusion {number} m^2/s: the position changes by {np.sqrt(q * dt):.3g} m a step"
+    if isinstance(motion, ConstantAcceleration):
+        change = f"the acceleration changes by {np.sqrt(q * dt):.3g} m/s^2 a step"
+        return f"constant acceleration {where}, white jerk, density {number} m^2/s^5: {change}"
+    if isinstance(motion, CoordinatedTurn):
+        turn = f"{_number(np.degrees(motion.rate_rad_s) * dt)} degrees a step"
+        kind = f"white acceleration, density {number} m^2/s^3"
+        return f"turn {where} by {turn}, {kind}: the velocity changes by {np.sqrt(q * dt):.3g} m/s a step"
     if motion.discrete:
-        kind = f"acceleration constant during a step, variance {_numbers(motion.intensity)} m^2/s^4"
+        kind = f"acceleration constant during a step, variance {number} m^2/s^4"
         change = np.sqrt(q) * dt
     else:
-        kind = f"white acceleration, density {_numbers(motion.intensity)} m^2/s^3"
+        kind = f"white acceleration, density {number} m^2/s^3"
         change = np.sqrt(q * dt)
-    return f"constant velocity in {scenario.dim}-D, {kind}: the velocity changes by {change:.3g} m/s a step"
+    return f"constant velocity {where}, {kind}: the velocity changes by {change:.3g} m/s a step"
 
 
 def _prior(scenario: Scenario) -> str:
-    index = np.array(scenario.motion.position_index)
-    rest = np.setdiff1d(np.arange(scenario.motion.state_size), index)
     mean, deviation = scenario.prior.mean, np.sqrt(np.diag(scenario.prior.covariance))
+    names, units = ("position", "velocity", "acceleration"), ("m", "m/s", "m/s^2")
+    size, dim = scenario.motion.state_size, scenario.dim
+    regular = scenario.motion.position_index == tuple(range(dim)) and size in (dim, 2 * dim, 3 * dim)
+    if regular and not isinstance(scenario.motion, LinearMotion):
+        blocks = [(names[i], units[i], np.arange(i * dim, (i + 1) * dim)) for i in range(size // dim)]
+    else:
+        index = np.array(scenario.motion.position_index)
+        blocks = [("position", "m", index), ("other components", "", np.setdiff1d(np.arange(size), index))]
+    parts = [
+        f"{name} {_point(mean[at])} {unit}, deviation {_numbers(deviation[at])} {unit}".replace(" ,", ",").rstrip()
+        for name, unit, at in blocks
+        if len(at)
+    ]
     cross = np.any(scenario.prior.covariance != np.diag(np.diag(scenario.prior.covariance)))
-    return (
-        f"position {_point(mean[index])} m, deviation {_numbers(deviation[index])} m; "
-        f"velocity {_point(mean[rest])} m/s, deviation {_numbers(deviation[rest])} m/s"
-        + ("; correlated" if cross else "")
-    )
+    return "; ".join(parts) + ("; correlated" if cross else "")
 
 
 def _link(link: Link, scenario: Scenario) -> dict[str, str]:
@@ -101,16 +125,18 @@ def _link(link: Link, scenario: Scenario) -> dict[str, str]:
     return {
         "anchor": link.name,
         "position m": _point(link.measurement.anchor),
-        "sight": _sight(link.sight),
+        "sight": _sight(link.sight) + ("" if link.chain is None else f"; chain {link.chain}, shared"),
         "LOS error": _noise(link.noises[LOS]),
-        "NLOS error": _noise(link.noises[NLOS]),
+        "NLOS error": "; ".join(_noise(noise) for noise in link.noises[NLOS:]) or "none",
         "ranges": f"{reports} of {scenario.steps}",
     }
 
 
 def _sight(sight: Sight) -> str:
     if isinstance(sight, KnownSight):
-        return f"known: NLOS at {int(np.sum(sight.modes))} of {len(sight.modes)} steps"
+        return f"known: NLOS at {int(np.sum(sight.modes != LOS))} of {len(sight.modes)} steps"
+    if len(sight.start) != 2:
+        return f"{len(sight.start)} conditions, starts with {_point(sight.start)}"
     start = f"starts NLOS with {_number(sight.start[NLOS])}"
     if isinstance(sight, DwellSight):
         los, nlos = sight.dwell_s
@@ -126,7 +152,19 @@ def _sight(sight: Sight) -> str:
 
 def _noise(noise: Noise) -> str:
     text = f"mean {_number(noise.mean)} m, deviation {_number(np.sqrt(noise.variance))} m"
-    return text if isinstance(noise, Gaussian) else f"{text}, {len(noise.components()[0])} components"
+    if isinstance(noise, Gaussian):
+        return text
+    if isinstance(noise, GaussianMixture):
+        return f"{text}, {len(noise.weights)} components"
+    return f"{noise_name(noise)}: {text}, {noise.regularity().status}"
+
+
+def noise_name(noise: Noise) -> str:
+    """What a person calls a law."""
+    if isinstance(noise, Sum):
+        return f"{noise_name(noise.first)} + {noise_name(noise.second)}"
+    words = "".join(f" {c.lower()}" if c.isupper() else c for c in type(noise).__name__)
+    return words.strip().replace("gaussian", "Gaussian").replace("laplace", "Laplace").replace("student t", "Student t")
 
 
 def _looks_like_degrees(scenario: Scenario) -> list[str]:

@@ -65,12 +65,37 @@ class MarkovSight(Sight):
             One number for both modes, or (LOS, NLOS).
         start
             Law at step 0; None takes the stationary law.
+
+        Raises
+        ------
+        InputError
+            If ``stay`` is no probability.
         """
         if traced(stay):
             los, nlos = jnp.broadcast_to(jnp.asarray(stay), (2,))
             return cls(start, jnp.array([[los, 1 - los], [1 - nlos, nlos]]))
         los, nlos = np.broadcast_to(float64(stay), (2,))
+        if not (0 <= los <= 1 and 0 <= nlos <= 1):  # NaN too
+            raise InputError(
+                f"the probability of keeping the sight is {stay}",
+                "Give a number from 0 to 1, or one for LOS and one for NLOS; mean seconds are for DwellSight",
+            )
         return cls(start, [[los, 1 - los], [1 - nlos, nlos]])
+
+    @classmethod
+    def independent(cls, law) -> "MarkovSight":
+        """Modes drawn afresh at every step.
+
+        Parameters
+        ----------
+        law
+            Probability of every mode, [modes].
+
+        >>> MarkovSight.independent([0.8, 0.2]).transition.tolist()
+        [[0.8, 0.2], [0.8, 0.2]]
+        """
+        law = float64(law)
+        return cls(law, (jnp if traced(law) else np).broadcast_to(law, (len(law), len(law))))
 
     def transitions(self, intervals: Float[Array, " steps"]) -> Float[Array, "steps modes modes"]:
         if not traced(intervals) and np.ptp(intervals) > EQUAL_STEPS * np.max(intervals):
