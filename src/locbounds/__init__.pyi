@@ -31,8 +31,10 @@ from .noise import (
     minimum_error,
 )
 from .priors import DensityPrior, GaussianPrior
+from .reference import reference
 from .registry import explain
 from .report import plot
+from .requirement import comply
 from .result import Result, tightest
 from .scenario import Link, Scenario
 from .scoring import Score, score
@@ -100,6 +102,7 @@ __all__ = [
     "bcrb",
     "bcrb_algorithm1",
     "bhattacharyya",
+    "comply",
     "discrete_mmse",
     "enumer",
     "evaluate",
@@ -115,6 +118,7 @@ __all__ = [
     "quantile",
     "read_log",
     "read_survey",
+    "reference",
     "save",
     "score",
     "simulate",

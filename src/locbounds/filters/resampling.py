@@ -1,5 +1,7 @@
 """Systematic resampling of many particle clouds at once."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 
@@ -32,7 +34,7 @@ def systematic(w: Float[Array, "particles tracks"], u: Float[Array, " tracks"]) 
     track = jnp.arange(tracks)
     halvings = max(1, (particles - 1).bit_length())
 
-    def halve(_: int, bracket: tuple[Array, Array]) -> tuple[Array, Array]:
+    def halve(_: Any, bracket: tuple[Array, Array]) -> tuple[Array, Array]:
         low, high = bracket
         middle = (low + high) // 2
         passed = jnp.take(sums, middle * tracks + track, mode="clip") <= points

@@ -1,6 +1,7 @@
 """Tables and figures of the study."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -122,10 +123,12 @@ def fig2_csv(found: Study) -> str:
     return csv_text(FIG2_COLUMNS, rows)
 
 
-def _lines(found: Study):
+def _lines(found: Study) -> Iterator[tuple[str, Result, dict[str, Any]]]:
     for k, (name, result) in enumerate(found.results.items()):
         bound = result.kind == "bound"
-        style = {"ls": "-", "lw": 2.0} if bound else {"ls": "--" if name == "oracle" else "-", "lw": 1.1}
+        style: dict[str, Any] = (
+            {"ls": "-", "lw": 2.0} if bound else {"ls": "--" if name == "oracle" else "-", "lw": 1.1}
+        )
         yield name, result, style | {"color": plot.colour(result.id, k)}
 
 
