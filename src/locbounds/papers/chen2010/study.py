@@ -93,9 +93,10 @@ def study(
 
     Examples
     --------
-    >>> found = study(runs=4, steps=8, samples=100)
-    >>> list(found.results)
-    ['known-sight', 'IMM-KF', 'EKF banks', 'RBPF', 'oracle']
+    >>> study(runs=1)
+    Traceback (most recent call last):
+        ...
+    locbounds.errors.InputError: the number of runs is 1. Give a whole number of at least 2
     """
     if runs < 2 or int(runs) != runs:
         raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 2")
