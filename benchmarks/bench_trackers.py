@@ -25,7 +25,7 @@ MANY, MANY_RUNS = 2_000, 100  # paired over runs, 100 of them tell a difference 
 
 def loops(model, z) -> dict[str, float]:
     """Seconds per step of the textbook's loops."""
-    import textbook_trackers as textbook
+    import textbook_trackers as textbook  # pyright: ignore[reportMissingImports]
 
     rng = np.random.default_rng(0)
     work = {
