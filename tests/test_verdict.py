@@ -1,6 +1,7 @@
 """The registry and the verdicts that follow from it."""
 
 import importlib
+from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -102,6 +103,9 @@ def changed(scenario, kind):
     if kind == "modes":
         laws = (lb.Gaussian(0.0, 1.0), lb.Gaussian(3.0, 2.0), lb.Gaussian(6.0, 2.0))
         return noise_of(scenario, sight=lb.MarkovSight(None, np.full((3, 3), 1 / 3)), noises=laws)
+    if kind == "shared":
+        links = [a.replace(sight=scenario.links[0].sight, chain="one") for a in scenario.links]
+        return scenario.replace(links=links)
     return scenario  # its sight is random
 
 
@@ -110,12 +114,13 @@ VIOLATIONS = {
     "the sight of every link is a Markov chain of its own": ("chain", "anchor a0 is no Markov chain: its transition"),
     "the motion is linear with Gaussian noise, Q positive semidefinite": ("motion", "negative variance"),
     "no measurement is infinitely steep at its anchor": ("steep", "anchor a0 grows infinitely steep"),
+    "motion without modes, one chain per link, measurements that do not depend on it": ("shared", "share a chain"),
     "every link is either LOS or NLOS": ("modes", "do not have exactly the modes LOS and NLOS"),
     "the sight of every link is known at every step": ("random", "sight of a0, a1 is random"),
 }
 
 
-@pytest.mark.parametrize(("id", "assumption"), [(m.id, a) for m in METHODS.values() for a in m.assumptions],
+@pytest.mark.parametrize(("id", "assumption"), [(m.id, a) for m in bounds_of("scenario") for a in m.assumptions],
                          ids=lambda x: getattr(x, "text", x))  # fmt: skip
 def test_every_assumption_has_a_scenario_that_violates_it_and_a_verdict_that_says_so(scenario, id, assumption):
     kind, words = VIOLATIONS[assumption.text]
@@ -130,6 +135,12 @@ def test_every_assumption_has_a_scenario_that_violates_it_and_a_verdict_that_say
     assert f"violated {assumption.text}: {reason}" in lb.explain(id, bad)
     good = scenario.with_known_sight(np.zeros(STEPS, int)) if id == "known-sight" else scenario
     assert entry.check(good) == [(a.text, None) for a in entry.assumptions]
+
+
+def test_a_survey_of_one_point_is_no_survey():
+    verdict = method("survey").verdict(SimpleNamespace(points=1, dangers=lambda: ()))
+    assert verdict.status is Status.REFUSED
+    assert verdict.reasons == ("the survey has 1 point",)
 
 
 def test_a_steep_measurement_is_refused_where_its_information_is_infinite_only(scenario):

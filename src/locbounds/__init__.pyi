@@ -1,6 +1,16 @@
 # The public names: what type checkers see, and what is imported on first use (lazy-loader reads this file).
 from . import papers, testing
-from .bounds import AlongTrack, Gaussians, Prior, bcrb, bcrb_algorithm1, enumer, known_sight, los_only
+from .bounds import (
+    AlongTrack,
+    Gaussians,
+    Prior,
+    bcrb,
+    bcrb_algorithm1,
+    bcrb_block_tridiagonal,
+    enumer,
+    known_sight,
+    los_only,
+)
 from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
 from .filters import EkfBanks, Estimates, FactorisedImmEkf, ImmEkf, ImmKf, ImmKfSmoother, OracleEkf, Rbpf
@@ -101,6 +111,7 @@ __all__ = [
     "Uniform",
     "bcrb",
     "bcrb_algorithm1",
+    "bcrb_block_tridiagonal",
     "bhattacharyya",
     "comply",
     "discrete_mmse",

@@ -338,7 +338,7 @@ def explain(id: str, scenario: Scenario | None = None) -> str:
     >>> print(explain("bcrb").splitlines()[0])
     BCRB (bcrb), a bound
     >>> import locbounds as lb
-    >>> print(explain("known-sight", lb.papers.fritsche2013.scenario()).splitlines()[-2][:60])
+    >>> print(explain("known-sight", lb.papers.fritsche2013.scenario()).splitlines()[-3][:60])
     violated the sight of every link is known at every step: the
     """
     if id in TOPICS:
