@@ -15,7 +15,7 @@ from locbounds.linalg import psd_root
 
 
 def imm(model, z):
-    """IMM of EKFs over all chains' joint modes, with noises as Gaussians of the same moments; means [runs, steps, state].
+    """IMM of EKFs over all chains' joint modes, with Gaussians of the noises' moments; means [runs, steps, state].
 
     NumPy; links of a scenario turned into a JumpMarkov, measurements z [runs, steps, channels] with NaN where there is
     none.
@@ -73,7 +73,8 @@ def imm(model, z):
 @eqx.filter_jit
 def _particles(model, z, seed, count):
     runs, steps = z.shape[:2]
-    F, roots = model.motion.transitions(model.times.intervals), psd_root(model.motion.covariances(model.times.intervals))
+    F = model.motion.transitions(model.times.intervals)
+    roots = psd_root(model.motion.covariances(model.times.intervals))
     transitions = [model.transitions(c) for c in range(len(model.chains))]
     first, later = jax.random.split(jax.random.key(seed))
     x = jax.random.normal(first, (runs, count, model.state_size)) @ psd_root(jnp.asarray(model.prior.covariance))
@@ -90,10 +91,10 @@ def _particles(model, z, seed, count):
             for m, channel in enumerate(model.channels):
                 if channel.chain == c:
                     seen = jnp.nan_to_num(z[:, m, None])
-                    values = [
-                        noise.log_prob(seen - jax.vmap(jax.vmap(lambda x, r=r, h=channel.h: h(x, r, k)))(channel.seen(x)))
-                        for r, noise in enumerate(channel.noises)
-                    ]
+                    values = []
+                    for r, noise in enumerate(channel.noises):
+                        h = jax.vmap(jax.vmap(lambda x, r=r, h=channel.h: h(x, r, k)))
+                        values.append(noise.log_prob(seen - h(channel.seen(x))))
                     log_l = log_l + jnp.where(jnp.isfinite(z[:, m])[:, None, None], jnp.stack(values, -1), 0.0)
             joint = (p @ T) * jnp.exp(log_l - log_l.max(-1, keepdims=True))
             log_w = log_w + log_l.max(-1) + jnp.log(joint.sum(-1))

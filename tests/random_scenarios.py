@@ -134,19 +134,18 @@ def manoeuvring(seed):
     links = [
         lb.Link(f"a{m}", lb.Range(d.place()), sight, tuple(d.gaussians()), d.mask(), chain="door") for m in range(2)
     ]
-    return lb.Scenario(
-        "manoeuvres", d.uniform_times(), lb.SwitchingMotion(turns, d.chain(3)), d.prior(1), links
-    )
+    return lb.Scenario("manoeuvres", d.uniform_times(), lb.SwitchingMotion(turns, d.chain(3)), d.prior(1), links)
 
 
 def calm_or_rough(seed):
-    """Singular process noise in 3-D of two intensities, on the chain of one link; the other, with a reflection, has its own."""
+    """Singular process noise in 3-D of three intensities, on the chain of one link; the other is reflected."""
     d = Draw(seed, dim=3)
-    q = (d.spread * d.within(0.1, 1.0, 2)) ** 2 / (d.step_s**2 * STEPS) ** 2
-    sight = d.chain()
-    motion = lb.SwitchingMotion([lb.ConstantVelocity(q_r, dim=3, discrete=True) for q_r in q], sight, "weather")
+    q = (d.spread * d.within(0.1, 1.0, 3)) ** 2 / (d.step_s**2 * STEPS) ** 2
+    weather = d.chain(3)
+    motion = lb.SwitchingMotion([lb.ConstantVelocity(q_r, dim=3, discrete=True) for q_r in q], weather, "weather")
+    reflected = lb.BySight([lb.Range(d.place()), lb.Range(d.place())])
     links = [
-        lb.Link("a0", lb.Range(d.place()), sight, tuple(d.gaussians()), d.mask(), chain="weather"),
-        lb.Link("a1", lb.BySight([lb.Range(d.place()), lb.Range(d.place())]), d.chain(), tuple(d.gaussians()), d.mask()),
+        lb.Link("a0", lb.Range(d.place()), weather, tuple(d.gaussians(3)), d.mask(), chain="weather"),
+        lb.Link("a1", reflected, d.chain(), tuple(d.gaussians()), d.mask()),
     ]
     return lb.Scenario("calm or rough", d.uniform_times(), motion, d.prior(1), links)
