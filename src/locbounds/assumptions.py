@@ -6,7 +6,7 @@ import numpy as np
 
 from locbounds.errors import InputError
 from locbounds.linalg import is_positive_semidefinite
-from locbounds.measurement import BySight
+from locbounds.measurement import BySight, Range
 from locbounds.motion import SwitchingMotion
 from locbounds.precision import double_precision, traced
 from locbounds.scenario import Scenario
@@ -23,9 +23,10 @@ def no_chain(scenario: Scenario) -> str | None:
     if traced(scenario):
         return None
     for link in scenario.links:
+        transitions = np.asarray(link.sight.transitions(scenario.times.intervals))  # raises if the times do not suit
         try:
             check_probabilities(np.asarray(link.sight.start), "its start")
-            check_probabilities(np.asarray(link.sight.transitions(scenario.times.intervals)), "its transition")
+            check_probabilities(transitions, "its transition")
         except InputError as error:
             return f"the sight of anchor {link.name} is no Markov chain: {error.cause}"
     return None
@@ -62,6 +63,7 @@ def infinite_information(scenario: Scenario) -> str | None:
         (link, h)
         for link in scenario.links
         for h in (link.measurement.measurements if isinstance(link.measurement, BySight) else (link.measurement,))
+        if type(h) is not Range  # whose gradient has length one everywhere
     ]
     for link, h in each:
         anchor = np.asarray(h.anchor)

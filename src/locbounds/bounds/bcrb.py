@@ -9,6 +9,7 @@ import numpy as np
 from locbounds.axes import Array, Float
 from locbounds.blocks import GROUPS, check_seed
 from locbounds.bounds.common import bound_result, prepare
+from locbounds.bounds.corrected import corrected
 from locbounds.bounds.expectation import Expectation
 from locbounds.bounds.general import general, model_verdict
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
@@ -26,6 +27,7 @@ from locbounds.verdict import Status
 PATHS = 64  # noise paths per group and block
 FIRST_WINDOW = 12
 FEWEST_GROUPS = 16  # kept even for large tables: fewer say too little about a standard error
+MOST_BYTES = 1e9  # tables and draws above this size are not kept: the corrected engine needs none
 TABLE_BYTES = 2.5e8  # above this size of one link's increments, fewer groups are kept
 
 
@@ -77,6 +79,7 @@ def bcrb(
     seed: int = 0,
     expectation: Expectation | None = None,
     window: int | None = None,
+    engine: str | None = None,
     progress: Progress | None = None,
 ) -> Result:
     r"""Bayesian Cramér-Rao bound of a jump-Markov model, at every step.
@@ -104,6 +107,11 @@ def bcrb(
     window
         How many steps back a measurement's information correlates with that of others; by default it grows until
         the truncation, as estimated below, is at most ``rtol / 10`` (``rtol`` 1e-3 where none is given).
+    engine
+        ``"windowed"`` or ``"corrected"``, for models that separate. The windowed engine keeps tables of all steps, its
+        number is that of the truncated information. The corrected engine (:mod:`locbounds.bounds.corrected`) keeps
+        none and takes all lags, whatever the window. By default the windowed one, and the corrected one where tables
+        or draws of all steps would take more than a gigabyte.
     progress
         Called with (samples, precision reached, target) after every look.
 
@@ -114,7 +122,9 @@ def bcrb(
         from z_1..z_k. ``diagnostics["truncation"]`` is the relative error of the position RMSE, at the worst step,
         made by truncating at the window, as extrapolated from how the bound changes when the window is shortened by a
         quarter and by a half. It exceeds the error where the entries left out decay quickly; it is no guarantee, and
-        the error may have either sign. NaN where the window was given.
+        the error may have either sign. NaN where the window was given. From the corrected engine it is the distance
+        between the truncated and the corrected value, and ``diagnostics["remainder"]``, its square, the order of what
+        the corrected value, which lies below the bound up to its standard error, still lacks.
 
     Raises
     ------
@@ -139,8 +149,33 @@ def bcrb(
     True
     """
     if isinstance(scenario, JumpMarkov) or beyond_separation(scenario):
+        if engine is not None:
+            raise InputError(f"engine {engine!r} does not take this model", "Leave the engine out")
         return _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress)
+    if engine not in (None, "windowed", "corrected"):
+        raise InputError(f"the engine is {engine!r}", "Give 'windowed' or 'corrected', or leave it out")
+    why = "it was asked for" if engine else too_large(scenario, window)
+    if engine == "corrected" or (engine is None and why is not None and not traced(scenario, expectation)):
+        return corrected(scenario, rtol, samples, seed, expectation, window, progress, str(why))
     return separated("bcrb", scenario, rtol, samples, seed, expectation, window, progress)
+
+
+def too_large(scenario: Scenario, window: int | None) -> str | None:
+    """Why the tables of the windowed engine would not fit, or None.
+
+    >>> import locbounds as lb
+    >>> too_large(lb.papers.fritsche2013.scenario(), None) is None
+    True
+    """
+    size = min(FIRST_WINDOW if window is None else window, scenario.steps)
+    if traced(scenario):
+        return None
+    links = len(set(_distinct([noise_process(scenario, link) for link in scenario.links])))
+    tables = 8.0 * FEWEST_GROUPS * scenario.steps * size**2 * links
+    draws = 8.0 * FEWEST_GROUPS * PATHS * scenario.steps * (6 + size)
+    if tables + draws <= MOST_BYTES:
+        return None
+    return f"tables of {scenario.steps:,} steps and {links} different noises would take {(tables + draws) / 1e9:.1f} GB"
 
 
 def _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress) -> Result:

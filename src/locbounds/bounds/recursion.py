@@ -126,7 +126,7 @@ def covariance_recursion(
     """
     model = linear_model(scenario)
     n, groups = len(model.P0), increments.groups
-    window = _Window(model, increments.ages)
+    window = Window(model, increments.ages)
     index = np.array(model.position)
 
     def step(carry, inputs):
@@ -137,7 +137,7 @@ def covariance_recursion(
         if dD is not None:
             L = S[:, window.observed]
             M = (jnp.eye(window.size).at[:, window.observed].add(-L @ D)) @ window.shift(F)
-            dS = _congruence(M, dS) - _congruence(L, dD)
+            dS = congruence(M, dS) - congruence(L, dD)
         return (S, dS, carried), (S[:n, :n], dS[index, :, index].sum(0))
 
     first = window.first(), jnp.zeros((window.size, groups, window.size)), increments.first()
@@ -147,14 +147,14 @@ def covariance_recursion(
     return P, jnp.concatenate([jnp.zeros((groups, 1)), changes.T], axis=1)
 
 
-def _congruence(A: Float[Array, "a b"], X: Float[Array, "b groups b"]) -> Float[Array, "a groups a"]:
+def congruence(A: Float[Array, "a b"], X: Float[Array, "b groups b"]) -> Float[Array, "a groups a"]:
     """``A X_g A'`` for every group, as two matrix products."""
     a, b = A.shape
     left = (A @ X.reshape(b, -1)).reshape(-1, b)
     return (left @ A.T).reshape(a, -1, a)
 
 
-class _Window:
+class Window:
     """The last states as one vector [x_k, position at age 1, ..., position at age W-1] and its covariance."""
 
     def __init__(self, model: LinearModel, ages: int):

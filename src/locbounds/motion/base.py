@@ -35,11 +35,11 @@ class Motion(eqx.Module):
 
     def transitions(self, intervals: Float[Array, " steps"]) -> Float[Array, "steps state state"]:
         """F of every step, given the intervals in seconds."""
-        return jax.vmap(self.transition)(jnp.asarray(intervals))
+        return _every_step(self, jnp.asarray(intervals), covariance=False)
 
     def covariances(self, intervals: Float[Array, " steps"]) -> Float[Array, "steps state state"]:
         """Q of every step, given the intervals in seconds."""
-        return jax.vmap(self.covariance)(jnp.asarray(intervals))
+        return _every_step(self, jnp.asarray(intervals), covariance=True)
 
     @property
     def state_size(self) -> int:
@@ -54,3 +54,8 @@ class Motion(eqx.Module):
     def position(self, x: Float[Array, "*n state"]) -> Float[Array, "*n space"]:
         """The position coordinates of a state."""
         return x[..., list(self.position_index)]
+
+
+@eqx.filter_jit
+def _every_step(motion: Motion, intervals: Array, *, covariance: bool) -> Array:
+    return jax.vmap(motion.covariance if covariance else motion.transition)(intervals)
