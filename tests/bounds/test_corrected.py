@@ -138,12 +138,12 @@ def carried_and_streamed(steps):
     with jax.enable_x64(True):
         traced = jax.make_jaxpr(
             lambda: corrected_bound(
-                scenario, lb.Prior(), np.uint32(0), np.uint32(0), np.zeros((steps, 4, 4)),
+                scenario, lb.Prior(), np.uint32(0), np.uint32(0), np.zeros((steps + 1, 4, 4)),
                 groups=32, paths=16, pilot=32, window=2,
             )
         )()  # fmt: skip
     (call,) = [e for e in traced.eqns if "jaxpr" in e.params]
-    scans = [e for e in call.params["jaxpr"].eqns if e.primitive.name == "scan" and e.params["length"] == steps]
+    scans = [e for e in call.params["jaxpr"].eqns if e.primitive.name == "scan" and e.params["length"] == steps + 1]
     (scan,) = [e for e in scans if e.params["num_carry"] > 3]
     fixed, carry = scan.params["num_consts"], scan.params["num_carry"]
     size = [v.aval.size * v.aval.dtype.itemsize for v in scan.invars]
@@ -154,8 +154,8 @@ def carried_and_streamed(steps):
 def test_memory_is_that_of_the_models_numbers_and_of_the_result():
     short, long = carried_and_streamed(20), carried_and_streamed(40)
     assert short[0] == long[0]
-    assert long[1] == 2 * short[1]
-    assert long[1] / 40 < 4000  # per step; one number of every draw would be 16 kB
+    assert long[1] / 41 == short[1] / 21
+    assert long[1] / 41 < 4000  # per step; one number of every draw would be 16 kB
 
 
 def test_long_scenarios_get_it_by_themselves(scenario, bound, monkeypatch):

@@ -26,16 +26,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float, Int
-from locbounds.blocks import Stream, block_key
-from locbounds.bounds.expectation import Expectation, Prior
+from locbounds.axes import Array, Float
+from locbounds.bounds.expectation import Expectation
 from locbounds.bounds.recursion import Window, linear_model
-from locbounds.bounds.score_covariance import NoiseProcess, mode_information, noise_process
-from locbounds.linalg import psd_root
+from locbounds.bounds.streams import Draws, Kind, reports_of
 from locbounds.noise import Noise
-from locbounds.scenario import Link, Scenario, alike
-from locbounds.sight.draws import next_sight
-from locbounds.simulation import draw_noise
+from locbounds.scenario import Scenario
 
 RIDGE = 1e-10  # of the scaled window covariance, which is singular where the motion is
 
@@ -61,13 +57,12 @@ class Corrected(NamedTuple):
     replicates: Float[Array, "groups times"]
     windowed: Float[Array, "times state state"]
     position_mse: Float[Array, "2 times"]
-    increments: Float[Array, "steps ages_space ages_space"]
+    increments: Float[Array, "times ages_space ages_space"]
 
 
 class _Chains(NamedTuple):
     """What is carried for links of one structure; groups lead, those that make V (the pilot) before the others."""
 
-    sight: Int[Array, "groups links paths"]
     law: Float[Array, "links modes"]
     p: list[Float[Array, "groups links paths"]]  # by mode
     all: Float[Array, "groups size others links paths"]  # E[T | r] - E[T | 0]
@@ -106,15 +101,13 @@ def _hear(p, T, noises: tuple[Noise, ...], w, known, reported) -> _News:
     a = _total(now[j] * s[j] for j in modes)
     per_now = [1 / jnp.where(now[j] > 0, now[j], 1.0) for j in modes]
     others = modes[1:]
-    return jax.lax.optimization_barrier(
-        _News(
-            now,
-            [before[i] - p[i] for i in others],
-            [_total(joint[i][j] * s[j] for j in modes) - a * before[i] for i in others],
-            jnp.where(here, known[:, None], 0.0) - _total(now[j] * s[j] ** 2 for j in modes) + a**2,
-            [[joint[i][j] * per_now[j] - joint[i][0] * per_now[0] for j in others] for i in others],
-            [s[j] - s[0] for j in others],
-        )
+    return _News(
+        now,
+        [before[i] - p[i] for i in others],
+        [_total(joint[i][j] * s[j] for j in modes) - a * before[i] for i in others],
+        jnp.where(here, known[:, None], 0.0) - _total(now[j] * s[j] ** 2 for j in modes) + a**2,
+        [[joint[i][j] * per_now[j] - joint[i][0] * per_now[0] for j in others] for i in others],
+        [s[j] - s[0] for j in others],
     )
 
 
@@ -153,20 +146,13 @@ def _times(M: Float[Array, "a b"], x: Float[Array, "groups b *n"]) -> Float[Arra
     return product.reshape(len(x), len(M), *x.shape[2:])
 
 
-def _constants(links: list[Link], scenario: Scenario) -> tuple[NoiseProcess, Array]:
-    """Noise processes and known-mode informations of links of one structure, with a leading axis of links."""
-    each = [noise_process(scenario, link) for link in links]
-    processes = jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(x) for x in leaves]), *each)
-    return processes, jnp.stack([mode_information(process) for process in each])
-
-
 @partial(jax.jit, static_argnames=("groups", "paths", "pilot", "window"))
 def corrected_bound(
     scenario: Scenario,
     expectation: Expectation,
     seed: Array,
     block: Array,
-    earlier: Float[Array, "steps ages_space ages_space"],
+    earlier: Float[Array, "times ages_space ages_space"],
     *,
     groups: int,
     paths: int,
@@ -175,75 +161,40 @@ def corrected_bound(
 ) -> Corrected:
     """One block: ``pilot`` groups of paths make V, with those of earlier blocks, ``groups`` others the value.
 
-    Every step's draws have a key of their own, so that what is computed for a step does not depend on how many come
-    after it. What is carried from step to step does not grow with them.
+    What is carried from step to step does not grow with them. Step 0 hears nothing. The draws of a step are made in
+    the round before: what is carried is computed once, whereas XLA repeats what it can fuse into several kernels.
     """
     model = linear_model(scenario)
     n_state, index = len(model.P0), np.array(model.position)
     S_window = Window(model, window)
     size, space = S_window.size, len(index)
     every = pilot + groups
-    n = every * paths
-    tracks, noise = (block_key(seed, stream, block) for stream in (Stream.TRACKS, Stream.SIGHT_AND_NOISE))
-    kinds = alike(scenario.links)
-    constants = [_constants([scenario.links[m] for m in members], scenario) for members, _ in kinds]
-    streamed = isinstance(expectation, Prior)
-    roots = psd_root(scenario.process_noise)
-    given = None if streamed else jnp.moveaxis(expectation.positions(scenario, tracks, n), 0, 1)
+    draws = Draws(scenario, expectation, seed, block, every, paths)
+    kinds = draws.kinds
 
-    def first_chains(process: NoiseProcess, number: int) -> _Chains:
-        links, modes = process.start.shape
-        keys = jax.vmap(partial(jax.random.fold_in, jax.random.fold_in(noise, 0)))(number + jnp.arange(links))
-
-        def draw(law, key):
-            return next_sight(law[None], jnp.zeros((every, paths), int), jax.random.uniform(key, (every, paths)))
-
+    def first_chains(kind: Kind) -> _Chains:
+        start = kind.process.start
+        links, modes = start.shape
         return _Chains(
-            jax.vmap(draw, 0, 1)(process.start, keys),
-            process.start,
-            [jnp.broadcast_to(process.start[:, r, None], (every, links, paths)) for r in range(modes)],
+            start,
+            [jnp.broadcast_to(start[:, r, None], (every, links, paths)) for r in range(modes)],
             jnp.zeros((every, size, modes - 1, links, paths)),
             jnp.zeros((pilot, window * space, modes - 1, links, paths)),
         )
 
-    offsets = np.cumsum([0, *(len(members) for members, _ in kinds)])
-    root0 = psd_root(model.P0)
-    x0 = scenario.prior.mean + jax.random.normal(jax.random.fold_in(tracks, 0), (n, n_state)) @ root0
-
     def step(carry, inputs):
-        S, missing_pilot, missing, x, chains = carry
-        k, F, Q, root, pieces, given, before_D = inputs
-        if streamed:
-            x = x @ F.T + jax.random.normal(jax.random.fold_in(tracks, k), x.shape) @ root
-            position = scenario.motion.position(x)
-        else:
-            position = jnp.broadcast_to(given, (n, space))
+        S, missing_pilot, missing, chains, x, drawn = carry
+        (F, Q, transitions, reports, before_D), coming = inputs
 
         heard, own = [], jnp.zeros((window * space, window * space))
-        for chain, (process, info), (T, reported), (_, like), first in zip(
-            chains, constants, pieces, kinds, offsets, strict=False
-        ):
-            links = len(T)
-            keys = jax.vmap(partial(jax.random.fold_in, jax.random.fold_in(noise, k)))(first + jnp.arange(links))
-
-            def draw(key, T, sight, noises):
-                change, disturb = jax.random.split(key)
-                sight = next_sight(T, sight, jax.random.uniform(change, sight.shape))
-                return sight, draw_noise(disturb, noises, sight)
-
-            def gradients(link):
-                return jnp.moveaxis(jax.vmap(jax.grad(link.measurement))(position).reshape(every, paths, space), 2, 1)
-
-            drawn = jax.vmap(draw, (0, 0, 1, 0), 1)(keys, T, chain.sight, process.noises)
-            (sight, w), u = jax.lax.optimization_barrier((drawn, jax.vmap(gradients, 0, 2)(like)))  # compute once
+        for kind, chain, (_, w, u), T, reported in zip(kinds, chains, drawn, transitions, reports, strict=True):
             law = jnp.einsum("li,lij->lj", chain.law, T)
-            news = _hear(chain.p, T, process.noises, w, jnp.sum(law * info, -1), reported)
+            news = _hear(chain.p, T, kind.process.noises, w, jnp.sum(law * kind.information, -1), reported)
             of_pilot = jax.tree.map(lambda x: x[:pilot], news)
             recent = jnp.concatenate([jnp.zeros_like(chain.recent[:, :space]), chain.recent[:, :-space]], 1)
-            l = jnp.zeros((pilot, window * space, links, paths)).at[:, :space].set(u[:pilot])
+            l = jnp.concatenate([u[:pilot], jnp.zeros((pilot, (window - 1) * space, *u.shape[2:]))], 1)
             own += _growth(recent, l, of_pilot).sum(0) / (pilot * paths)
-            recent = _mix(recent, l, of_pilot)
-            heard.append((_Chains(sight, law, news.p, chain.all, recent), news, u))
+            heard.append((_Chains(law, news.p, chain.all, _mix(recent, l, of_pilot)), news, u))
 
         D = (block * before_D + own) / (block + 1)
         S = S_window.update(S_window.predict(S, F, Q), D)
@@ -259,36 +210,39 @@ def corrected_bound(
 
         A = _best_combination(S, missing_pilot, n_state)
         mean = missing.mean(0)
-        value = S[:n_state] @ A
-        value = value + value.T - A.T @ (S - mean) @ A
         best = A[:, index]
         spread = jnp.einsum("ai,gab,bi->g", best, missing - mean, best)
-        of_pilot = S[:n_state] @ A
-        of_pilot = jnp.trace((of_pilot + of_pilot.T - A.T @ (S - missing_pilot) @ A)[np.ix_(index, index)])
         bare = S[:n_state, :n_state]
-        return (S, missing_pilot, missing, x, chains), (value, spread, bare, of_pilot, own)
+        of_pilot = jnp.trace(_value(S, missing_pilot, A)[np.ix_(index, index)])
+        x, drawn = draws.next(x, drawn, coming)
+        return (S, missing_pilot, missing, chains, x, drawn), (_value(S, mean, A), spread, bare, of_pilot, own)
 
-    zero = jnp.zeros((size, size))
     first = (
         S_window.first(),
-        zero,
+        jnp.zeros((size, size)),
         jnp.zeros((groups, size, size)),
-        x0 if streamed else None,
-        [first_chains(process, int(m)) for (process, _), m in zip(constants, offsets, strict=False)],
+        [first_chains(kind) for kind in kinds],
+        *draws.first(),
     )
-    pieces = [(jnp.swapaxes(p.transitions, 0, 1), jnp.swapaxes(p.reports, 0, 1)) for p, _ in constants]
-    inputs = jnp.arange(1, scenario.steps + 1), model.F, model.Q, roots, pieces, given, earlier
-    _, (value, spread, bare, of_pilot, own) = jax.lax.scan(step, first, inputs)
-    P0 = model.P0[None]
-    at_zero = jnp.sum(jnp.diag(model.P0)[index])[None]
-    windowed = jnp.concatenate([P0, bare])
-    return Corrected(
-        jnp.concatenate([P0, value]),
-        jnp.concatenate([jnp.zeros((groups, 1)), spread.T], axis=1),
-        windowed,
-        jnp.stack([windowed[:, index, index].sum(-1), jnp.concatenate([at_zero, of_pilot])]),
-        own,
+    steps = draws.steps()
+    nothing = jnp.eye(n_state)[None], jnp.zeros((1, n_state, n_state))
+    now = (
+        jnp.concatenate([nothing[0], model.F]),
+        jnp.concatenate([nothing[1], model.Q]),
+        [jnp.concatenate([jnp.broadcast_to(jnp.eye(T.shape[-1]), T[:1].shape), T]) for T in steps.transitions],
+        [jnp.concatenate([jnp.zeros_like(reports[:1]), reports]) for reports in map(reports_of, kinds)],
+        earlier,
     )
+    coming = jax.tree.map(lambda a: jnp.concatenate([a, a[-1:]]), steps)  # nobody hears what is drawn after the last
+    _, (value, spread, bare, of_pilot, own) = jax.lax.scan(step, first, (now, coming))
+    inside = bare[:, index, index].sum(-1)
+    return Corrected(value, spread.T, bare, jnp.stack([inside, of_pilot]), own)
+
+
+def _value(S, missing, A) -> Float[Array, "state state"]:
+    """``E'V + V'E - V'JV`` for the columns A of the window's V."""
+    both = S[: A.shape[1]] @ A
+    return both + both.T - A.T @ (S - missing) @ A
 
 
 def _best_combination(S, missing, n_state: int) -> Float[Array, "size state"]:

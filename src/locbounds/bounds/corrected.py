@@ -52,7 +52,7 @@ def _blocks(scenario, expectation, rtol, samples, seed, window, progress):
     index = np.array(scenario.motion.position_index)
 
     while True:
-        increments = jnp.zeros((scenario.steps, size * scenario.dim, size * scenario.dim))
+        increments = jnp.zeros((scenario.steps + 1, size * scenario.dim, size * scenario.dim))
 
         def draw(block: int, size: int = size) -> _Sums:
             nonlocal increments
