@@ -63,11 +63,11 @@ class Draw:
 
 
 def nearly_constant_velocity(seed):
-    """Known to the library's filters: Gaussian noises, one chain per link, gaps."""
+    """Known to the library's filters: Gaussian noises, one chain per link, irregular times, gaps."""
     d = Draw(seed)
-    links = [lb.Link(f"a{m}", lb.Range(d.place()), d.chain(), tuple(d.gaussians()), d.mask()) for m in range(3)]
+    links = [lb.Link(f"a{m}", lb.Range(d.place()), d.dwell(), tuple(d.gaussians()), d.mask()) for m in range(3)]
     motion = lb.ConstantVelocity((d.spread * d.within(0.01, 1.0)) ** 2 / (d.step_s * STEPS) ** 3)
-    return lb.Scenario("constant velocity", d.uniform_times(), motion, d.prior(1), links)
+    return lb.Scenario("constant velocity", d.irregular_times(), motion, d.prior(1), links)
 
 
 def accelerating(seed):

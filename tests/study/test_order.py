@@ -74,6 +74,7 @@ def test_no_filter_beats_a_bound_it_is_subject_to():
     assert [c for c in comparisons if not c[0] < limit] == []
 
 
+@pytest.mark.slow
 def test_a_broken_bound_would_be_caught():
     """The comparison has teeth: ten per cent above the error of a filter is far outside."""
     scenario = random_scenario(0)
