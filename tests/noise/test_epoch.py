@@ -37,6 +37,7 @@ def test_the_mean_is_sufficient_for_gaussian_noise_and_any_common_bias():
     np.testing.assert_allclose(joint, mean, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_samples_do_not_remove_a_common_bias():
     noise, bias = lb.Laplace(0.0, 1.0), lb.Gaussian(0.0, 2.0)
     common = lb.Epoch(noise, bias, 5).information(draws=2048)

@@ -62,10 +62,11 @@ def everything(name):
         return jax.tree.map(np.asarray, _everything(noise, reference.ppf(PROBABILITIES), jax.random.key(7)))
 
 
-LONG = ("sum of halves", "erlang")  # further convolutions, whose compilation takes long
+SLOW = pytest.mark.slow
+LONG = ("sum of halves", "sum of gammas", "erlang")  # further convolutions, whose compilation takes long
 
 
-@pytest.fixture(params=[pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in LAWS], scope="module")
+@pytest.fixture(params=[pytest.param(n, marks=SLOW) if n in LONG else n for n in LAWS], scope="module")
 def name(request):
     return request.param
 
@@ -104,7 +105,7 @@ INFORMATION["log-normal"] = np.exp(2 * 0.49) * (1 + 1 / 0.49) / 4.0
 INFORMATION["sum of gammas"] = 1 / (4.0 * 0.7)
 
 
-@pytest.mark.parametrize("name", INFORMATION)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=SLOW) if n in LONG else n for n in INFORMATION])
 def test_information_has_its_closed_form(name):
     """Textbook values; the convolution of two gamma laws of one scale is a gamma law, with an edge like t^1.7."""
     assert everything(name)["information"] == pytest.approx(INFORMATION[name], rel=1e-6)

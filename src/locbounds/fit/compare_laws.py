@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import ndarray
+from locbounds.axes import Array, ndarray
 from locbounds.errors import InputError
-from locbounds.fit.noise_law import LAWS, LawFit, fit_noise_law, log_densities
+from locbounds.fit.noise_law import LAWS, LawFit, fit_noise_law
 from locbounds.fit.one_sided import ONE_SIDED, ContradictedError
+from locbounds.noise import Noise
 from locbounds.precision import double_precision
 
 
@@ -106,15 +108,22 @@ def compare_noise_laws(
     return [_behind(row, best, group) for row in rows]
 
 
+@jax.jit
+def _both(noise: Noise, x: Array) -> tuple[Array, Array]:
+    return noise.log_prob(x), noise.cdf(x)
+
+
 def _compared(error_m, held: ndarray, group: ndarray, family: str, start: float | None) -> LawComparison:
     try:
         fit = fit_noise_law(error_m, family, start_m=start)
     except ContradictedError as error:
         return LawComparison(family, None, note=error.cause)
-    each = log_densities(fit.noise, held)
+    order = np.argsort(held)
+    log_p, F = (np.asarray(x) for x in _both(fit.noise, jnp.asarray(held[order])))
+    each = np.empty_like(log_p)
+    each[order] = log_p
     impossible = int((each == -np.inf).sum())
-    x = np.sort(held)
-    F, n = np.asarray(fit.noise.cdf(jnp.asarray(x))), len(x)
+    n = len(held)
     ks = float(max((np.arange(1, n + 1) / n - F).max(), (F - np.arange(n) / n).max()))
     notes = [f"impossible held out: {impossible}"] if impossible else []
     if family in ONE_SIDED and start is None:

@@ -64,9 +64,9 @@ def read_errors(
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as name:
     ...     path = Path(name) / "ranges.csv"
-    ...     _ = path.write_text("range_m,true_m,los\n5.5,5,1\n9,6,0\n7,7,1\n8,7.5,1\n")
-    ...     read_errors(path, distance="true_m", labels="los").error_m.tolist()
-    [0.5, 3.0, 0.0, 0.5]
+    ...     _ = path.write_text("range_m,true_m,los,fold\n5.5,5,1,a\n9,6,0,b\n")
+    ...     read_errors(path, distance="true_m", labels="los", hold_out="fold=b").error_m.tolist()
+    [0.5, 3.0]
     """
     columns = columns or LogColumns()
     if errors is not None and distance is not None:
@@ -148,7 +148,7 @@ def _distances(tables: dict[str, CsvTable], columns: LogColumns, points: str, di
 def _held(tables: dict[str, CsvTable], hold_out: str | None, own: str, group: ndarray) -> Bool[ndarray, " n"]:
     r = tables["ranges"]
     if hold_out is None:
-        held = group % EVERY == EVERY - 1
+        held = group % EVERY == min(EVERY, group.max() + 1) - 1
     elif "=" in hold_out:
         column, value = (part.strip() for part in hold_out.split("=", 1))
         truth = tables.get("truth")
