@@ -14,8 +14,8 @@ noise. ``X_k = V_k' J_z(k) V_k = Cov(E[T_k | track, noise])`` therefore grows by
 with the symbols of :mod:`locbounds.bounds.score_covariance` and one vector per draw and mode,
 ``b(r) = M_k (E[T_{k-1} | r_{k-1} = r] - E[T_{k-1} | r_{k-1} = 0])``, in the place of the differences of all earlier
 steps: ``xi = sum_r (q - p)(r) b(r)``, ``c = sum_r c(r) b(r)``.
-Nothing is left out, whatever the window: it only chooses V. Work per draw and step is
-constant. See docs/theory/score.md.
+Nothing is left out, whatever the window: it only chooses V. Work per draw and step is constant. See
+docs/theory/score.md.
 """
 
 from functools import partial, reduce
