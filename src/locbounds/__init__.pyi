@@ -1,9 +1,19 @@
 # The public names: what type checkers see, and what is imported on first use (lazy-loader reads this file).
 from . import papers, testing
-from .bounds import AlongTrack, Prior, bcrb, bcrb_algorithm1, bcrb_block_tridiagonal, enumer, known_sight, los_only
+from .bounds import (
+    AlongTrack,
+    Gaussians,
+    Prior,
+    bcrb,
+    bcrb_algorithm1,
+    bcrb_block_tridiagonal,
+    enumer,
+    known_sight,
+    los_only,
+)
 from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
-from .filters import Estimates, FactorisedImmEkf, ImmEkf, ImmKf, OracleEkf
+from .filters import EkfBanks, Estimates, FactorisedImmEkf, ImmEkf, ImmKf, ImmKfSmoother, OracleEkf, Rbpf
 from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
@@ -31,8 +41,10 @@ from .noise import (
     minimum_error,
 )
 from .priors import DensityPrior, GaussianPrior
+from .reference import reference
 from .registry import explain
 from .report import plot
+from .requirement import comply
 from .result import Result, tightest
 from .scenario import Link, Scenario
 from .scoring import Score, score
@@ -54,6 +66,7 @@ __all__ = [
     "DensityPrior",
     "Draws",
     "DwellSight",
+    "EkfBanks",
     "Epoch",
     "Estimates",
     "Exponential",
@@ -66,8 +79,10 @@ __all__ = [
     "Gaussian",
     "GaussianMixture",
     "GaussianPrior",
+    "Gaussians",
     "ImmEkf",
     "ImmKf",
+    "ImmKfSmoother",
     "InputError",
     "JumpMarkov",
     "KnownSight",
@@ -83,6 +98,7 @@ __all__ = [
     "Prior",
     "RandomWalk",
     "Range",
+    "Rbpf",
     "RefusedError",
     "Result",
     "Scenario",
@@ -97,6 +113,7 @@ __all__ = [
     "bcrb_algorithm1",
     "bcrb_block_tridiagonal",
     "bhattacharyya",
+    "comply",
     "discrete_mmse",
     "enumer",
     "evaluate",
@@ -112,6 +129,7 @@ __all__ = [
     "quantile",
     "read_log",
     "read_survey",
+    "reference",
     "save",
     "score",
     "simulate",

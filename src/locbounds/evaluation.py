@@ -53,7 +53,8 @@ def evaluate(
         ``position_mse`` with its spread over groups of runs. ``diagnostics``: ``error_m`` [runs, steps+1] position
         errors; ``nees`` [steps+1] mean normalised squared error of the state divided by its size (1 if consistent;
         only for filters that return covariances); ``lost`` number of runs whose last error is not finite or exceeds
-        ten times the median. Lost runs are counted, never dropped.
+        ten times the median. Lost runs are counted, never dropped. What a filter says about its own work is there
+        too, [runs, ...] each.
 
     Raises
     ------
@@ -90,10 +91,13 @@ def evaluate_on(
     """As :func:`evaluate`, on tracks that were drawn before: several filters then see the same ones."""
     runs, n = len(draws.states), scenario.motion.state_size
     errors, nees = [], []
+    diagnostics: dict[str, list[Any]] = {}
     covariance = np.zeros((scenario.steps + 1, n, n))
     for start in range(0, runs, RUNS_AT_ONCE):
         part = Draws(*(x[start : start + RUNS_AT_ONCE] for x in draws))
-        mean, spread = estimates(filter, scenario, part.measurements, part.sight, seed)
+        mean, spread, more = _run(filter, scenario, part.measurements, part.sight, seed)
+        for key, values in more.items():
+            diagnostics.setdefault(key, []).append(np.asarray(values))
         errors.append(position_error(scenario, mean, part.states))
         if mean.shape[-1] == n:
             e = mean - part.states
@@ -115,6 +119,7 @@ def evaluate_on(
         name=name,
         seed=seed,
         how="tracks drawn from the model",
+        diagnostics={key: np.concatenate(parts) for key, parts in diagnostics.items()},
     )
 
 
@@ -122,6 +127,13 @@ def estimates(
     filter: Callable[..., Any], scenario: Scenario, z: Array, sight: Array | None, seed: int
 ) -> tuple[Float[Array, "runs times n"], Float[Array, "runs times state state"] | None]:
     """Run a filter of the library or a callable; estimates at steps 0..K and covariances where it has them."""
+    return _run(filter, scenario, z, sight, seed)[:2]
+
+
+def _run(
+    filter: Callable[..., Any], scenario: Scenario, z: Array, sight: Array | None, seed: int
+) -> tuple[Array, Array | None, dict[str, Array]]:
+    """As :func:`estimates`, and what else the filter says about its work."""
     if isinstance(filter, type) or not callable(filter):
         name = filter.__name__ if isinstance(filter, type) else repr(filter)
         raise InputError(f"{name} is not a filter that can be called", "Give an instance, for example ImmEkf()")
@@ -141,7 +153,7 @@ def estimates(
             f"the filter returned estimates of shape {mean.shape} for {len(z)} runs of {scenario.steps} steps",
             f"Return [runs, steps+1, state] with {allowed[1]} components, or [runs, steps+1, space] with {allowed[0]}",
         )
-    return mean, spread
+    return mean, spread, getattr(output, "diagnostics", {})
 
 
 def position_error(scenario: Scenario, mean: Array, states: Array) -> Float[Array, "runs times"]:
@@ -175,6 +187,7 @@ def result_of_errors(
     seed: int,
     how: str,
     warnings: tuple[str, ...] = (),
+    diagnostics: dict[str, Any] | None = None,
 ) -> Result:
     """The result of a filter from its position errors; ``filter`` lends its id, name and what it sees."""
     runs = len(error)
@@ -186,7 +199,7 @@ def result_of_errors(
     if lost:
         warnings = (f"{lost} of {runs} runs were lost: their errors count fully", *warnings)
     id = getattr(filter, "id", "own")
-    diagnostics = {"error_m": error, "lost": np.int64(lost)}
+    diagnostics = (diagnostics or {}) | {"error_m": error, "lost": np.int64(lost)}
     if consistency is not None:
         diagnostics["nees"] = consistency.mean(0)
     return Result(

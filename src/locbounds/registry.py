@@ -22,6 +22,7 @@ from locbounds.verdict import (
 
 RANGES = frozenset({"ranges"})
 RANGES_AND_SIGHT = frozenset({"ranges", "sight"})
+PAST_AND_FUTURE_RANGES = frozenset({"ranges", "future-ranges"})
 LOS_RANGES_AND_SIGHT = frozenset({"los-ranges", "sight"})
 FINGERPRINT = frozenset({"fingerprint"})
 
@@ -184,6 +185,43 @@ METHODS: dict[str, Method] = {
             "Misses the turn of the range near an anchor; ignores the motion across links; least squares is wild "
             "where the geometry is poor, for example heights from anchors of one height.",
             ("liao2006", "fritsche2013"),
+        ),
+        Method(
+            "ekf-banks",
+            "EKF banks",
+            "filter",
+            "Per link one extended Kalman filter for each sight condition, fused over links by their information: "
+            "cost linear in anchors.",
+            RANGES,
+            "locbounds.filters:EkfBanks",
+            (),
+            "Forgets after every step which sight explained the past; its covariance is too small where a link's modes "
+            "disagree.",
+            ("chen2009", "chen2010"),
+        ),
+        Method(
+            "rbpf",
+            "RBPF",
+            "filter",
+            "Rao-Blackwellised particle filter: particles for the sight of all links, an extended Kalman filter for "
+            "the state of each particle; cost linear in anchors and particles.",
+            RANGES,
+            "locbounds.filters:Rbpf",
+            (),
+            "Random: seeds differ a little; needs more particles with more anchors; no better than its linearisation.",
+            ("chen2009rbpf", "chen2010"),
+        ),
+        Method(
+            "imm-kf-smoother",
+            "IMM-KF smoother",
+            "filter",
+            "The IMM-KF with ranges smoothed over the whole track, forwards and backwards: no filter, since it uses "
+            "ranges after the step.",
+            PAST_AND_FUTURE_RANGES,
+            "locbounds.filters:ImmKfSmoother",
+            (),
+            "Sees more than any filtering bound assumes and may be better than all of them; otherwise as imm-kf.",
+            ("liao2006", "chen2010"),
         ),
         Method(
             "oracle-ekf",

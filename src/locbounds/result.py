@@ -159,7 +159,9 @@ class Result(eqx.Module):
             raise RefusedError(
                 f"{self.name} sees {', '.join(sorted(self.sees - bound.sees))}, which {bound.name} assumes to be "
                 "unknown: the filter may be better than this bound",
-                "Use a bound that assumes at least as much, for example enumer for a filter told the sight",
+                "Compare a smoother, which uses ranges after the step, with other smoothers only"
+                if "future-ranges" in self.sees
+                else "Use a bound that assumes at least as much, for example enumer for a filter told the sight",
             )
         if self.track and self.track == bound.track:
             raise RefusedError(

@@ -223,9 +223,39 @@ class Scenario(eqx.Module):
         return self.replace(links=[a.replace(reports=reports[:, m]) for m, a in enumerate(self.links)])
 
     def with_known_sight(self, modes: Any) -> "Scenario":
-        """The same scenario with a known sight schedule, [steps, links] or [steps] for all links alike."""
+        """The same scenario with a known sight schedule.
+
+        Parameters
+        ----------
+        modes
+            0 = LOS, 1 = NLOS at steps 1..K: [steps, links], [steps] for all links alike, or a dict with one list per
+            anchor name.
+
+        Raises
+        ------
+        InputError
+            If the schedule has another length than the scenario or other anchors.
+        """
+        names = [link.name for link in self.links]
+        if isinstance(modes, dict):
+            unknown, missing = [n for n in modes if n not in names], [n for n in names if n not in modes]
+            if unknown or missing:
+                wrong = f"unknown anchors {unknown}" if unknown else f"nothing for the anchors {missing}"
+                raise InputError(f"the sight schedule has {wrong}", f"Give one list for each of {', '.join(names)}")
+            lengths = {n: len(modes[n]) for n in names}
+            if set(lengths.values()) != {self.steps}:
+                raise InputError(
+                    f"the sight schedules have {lengths} steps, the scenario {self.steps}",
+                    "Give one sight per step 1..K",
+                )
+            modes = np.stack([np.asarray(modes[n]) for n in names], axis=1)
         modes = np.asarray(modes)
-        modes = np.broadcast_to(modes[:, None] if modes.ndim == 1 else modes, (len(modes), len(self.links)))
+        if modes.shape not in ((self.steps,), (self.steps, len(names))):
+            raise InputError(
+                f"the sight schedule has shape {modes.shape}",
+                f"Give one sight per step 1..K: [{self.steps}], or [{self.steps}, {len(names)}], a column per anchor",
+            )
+        modes = np.broadcast_to(modes[:, None] if modes.ndim == 1 else modes, (len(modes), len(names)))
         links = [a.replace(sight=KnownSight(modes[:, m], len(a.noises)), chain=None) for m, a in enumerate(self.links)]
         return self.replace(links=links)
 

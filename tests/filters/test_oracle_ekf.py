@@ -5,6 +5,7 @@ import pytest
 
 import locbounds as lb
 import textbook_filters as textbook
+import textbook_trackers
 from filter_scenarios import awkward, with_gaps
 from locbounds.filters import ImmEkf, OracleEkf
 from locbounds.filters.lowering import lower
@@ -119,3 +120,24 @@ def test_wrong_sight_is_an_error(paper):
     scenario, draws = paper
     with pytest.raises(lb.InputError, match="sight"):
         OracleEkf()(scenario, draws.measurements[:1], 0, draws.sight[:1] + 1)
+
+
+@pytest.mark.parametrize("printed", [False, True])
+def test_decentralised_form_with_the_corrected_gain_and_as_printed(printed):
+    """Chen 2010, eqs. (22)-(26), by inverses of covariances; with the corrected gain it is this filter."""
+    scenario = awkward(2)
+    model = double_precision(lower)(scenario)
+    draws = lb.simulate(scenario, runs=2, seed=4)
+    z = with_gaps(draws.measurements)
+    ours = OracleEkf(printed_gain=printed)(scenario, z, sight=draws.sight)
+    for i in range(2):
+        mean, covariance = textbook_trackers.decentralised_ekf(model, z[i], draws.sight[i], printed=printed)
+        np.testing.assert_allclose(ours.mean[i], mean, rtol=1e-8, atol=1e-8)
+        np.testing.assert_allclose(ours.covariance[i], covariance, rtol=1e-8, atol=1e-8)
+
+
+def test_refuses_to_run_without_the_sight():
+    scenario = awkward(2)
+    z = lb.simulate(scenario, runs=2).measurements
+    with pytest.raises(lb.InputError, match="not told the sight"):
+        OracleEkf()(scenario, z)

@@ -120,7 +120,32 @@ def test_laws_without_a_file_form_are_named():
         dumps(scenario.replace(links=[odd]))
 
 
+SAMPLES = {
+    "{ sum = [{ std_m = 1.6, samples = 10 }, { family = 'uniform', low_m = 0, high_m = 3 }] }": lb.Epoch(
+        lb.Gaussian(0.0, 1.6), lb.Uniform(0.0, 3.0), 10
+    ).as_noise(),
+    "{ samples = 10, sum = [{ std_m = 3, mean_m = 1 }, { std_m = 4 }] }": lb.Gaussian(1.0, 5.0 / np.sqrt(10.0)),
+}
+
+
+@pytest.mark.parametrize("table", SAMPLES)
+def test_samples_with_a_bias_in_common_or_of_their_own(table):
+    scenario = with_los(table)
+    assert eqx.tree_equal(scenario.links[0].noises[0], SAMPLES[table])
+    assert eqx.tree_equal(loads(dumps(scenario)), scenario)
+
+
+def test_an_excess_on_averaged_noise_is_a_common_bias():
+    scenario = with_los("{ std_m = 4, samples = 4 }", "{ plus_los = true, family = 'exponential', scale_m = 5 }")
+    assert eqx.tree_equal(scenario.links[0].noises[1], lb.ExponentiallyModifiedGaussian(0.0, 2.0, 5.0))
+    assert eqx.tree_equal(loads(dumps(scenario)), scenario)
+
+
 BAD = [
+    ("{ std_m = 1, samples = 0 }", "links.los.samples is 0, but must be at least 1", "averaged"),
+    ("{ std_m = 1, samples = 2.5 }", "links.los.samples is 2.5, not a whole number", "averaged"),
+    ("{ family = 'laplace', scale_m = 1, samples = 4 }", "samples of an error that is not Gaussian", "locbounds.Epoch"),
+    ("{ samples = 4, sum = [{ std_m = 1 }, { family = 'laplace', scale_m = 1 }] }", "not Gaussian", "outside"),
     ("{ family = 'gama', shape = 2, scale_m = 1 }", "unknown family 'gama'", "Did you mean gamma?"),
     ("{ family = 'gamma', shape = 2 }", 'family = "gamma" but no scale_m', "Add scale_m"),
     ("{ family = 'gamma', shape = 2, scale_m = 1, std_m = 3 }", 'std_m, which family = "gamma"', "It takes: shape"),

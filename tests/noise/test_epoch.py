@@ -1,10 +1,15 @@
 """Per-sample and common bias of the samples of one epoch."""
 
+from functools import partial
+
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import locbounds as lb
+from compiling import QUICKLY
+from locbounds.precision import double_precision
 
 SIGMAS = 4.0
 
@@ -21,10 +26,14 @@ def test_gaussian_epochs_have_the_information_of_their_covariance():
 def test_the_mean_is_sufficient_for_gaussian_noise_and_any_common_bias():
     """The joint density, integrated over the bias numerically, has the score of the mean's density."""
     epoch = lb.Epoch(lb.Gaussian(0.0, 2.0), lb.Exponential(3.0), 4)
-    with jax.enable_x64(True):
-        w = np.asarray(epoch.sample(jax.random.key(0), (6,)))
-        joint = np.asarray(-jax.jvp(epoch.log_prob, (w,), (np.ones_like(w),))[1])
-        mean = np.asarray(epoch.as_noise().score(w.mean(-1)))
+
+    @double_precision
+    @partial(jax.jit, compiler_options=QUICKLY)
+    def scores(epoch, mean):
+        w = epoch.sample(jax.random.key(0), (6,))
+        return -jax.jvp(epoch.log_prob, (w,), (jnp.ones_like(w),))[1], mean.score(w.mean(-1))
+
+    joint, mean = scores(epoch, epoch.as_noise())
     np.testing.assert_allclose(joint, mean, rtol=1e-6)
 
 

@@ -1,11 +1,15 @@
 """What every noise promises: density, sampler, score, information and moments belong to one law."""
 
+from functools import partial
+
 import jax
 import numpy as np
 import pytest
 from scipy import integrate, stats
 
 import locbounds as lb
+from compiling import QUICKLY
+from locbounds.precision import double_precision
 
 NOISES = {
     "gaussian": lb.Gaussian(2.0, 3.0),
@@ -22,9 +26,14 @@ def noise(request):
     return NOISES[request.param]
 
 
+@double_precision
+@partial(jax.jit, compiler_options=QUICKLY)
+def log_density(noise, w):
+    return noise.log_prob(w)
+
+
 def density(noise, w):
-    with jax.enable_x64(True):
-        return np.exp(np.asarray(noise.log_prob(np.asarray(w))))
+    return np.exp(np.asarray(log_density(noise, np.asarray(w))))
 
 
 def integral(noise, f):

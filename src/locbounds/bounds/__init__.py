@@ -5,10 +5,12 @@ from locbounds.bounds.bcrb import bcrb, known_sight
 from locbounds.bounds.conditional import enumer, los_only
 from locbounds.bounds.corrected import bcrb_block_tridiagonal
 from locbounds.bounds.expectation import AlongTrack, Expectation, Prior
+from locbounds.bounds.gaussians import Gaussians
 
 __all__ = [
     "AlongTrack",
     "Expectation",
+    "Gaussians",
     "Prior",
     "bcrb",
     "bcrb_algorithm1",

@@ -8,10 +8,13 @@ import typer
 from locbounds.cli.log_options import (
     AnchorsOption,
     ColumnsOption,
+    DistanceOption,
+    ErrorsOption,
     EveryOption,
     HoldOutOption,
     LabelsOption,
     MergeOption,
+    PointsOption,
     SelectOption,
     TimeOffsetOption,
     TruthOption,
@@ -31,6 +34,9 @@ def fit(
     merge: MergeOption = 0.0,
     every: EveryOption = 1,
     labels: LabelsOption = None,
+    points: PointsOption = None,
+    distance: DistanceOption = None,
+    errors: ErrorsOption = None,
     columns: ColumnsOption = None,
     per_anchor: Annotated[bool, typer.Option("--per-anchor", help="Noise and dwell times for every anchor.")] = False,
     psd: Annotated[
@@ -48,32 +54,63 @@ def fit(
     """Fit noise, sight, motion and prior to a log of real ranges; write a scenario that track runs as it is.
 
     Writes scenario.toml (its comments say where every number came from), quality.csv, autocorrelation.csv and
-    quality.png; with --noise also noise.csv: which law the errors follow, and how far the others lie behind. Where
-    the log has labels, scenario.toml then takes the best law of each sight.
+    quality.png; with --noise also noise.csv and noise.png: which law the errors follow, and how far the others lie
+    behind. Where the log has labels, scenario.toml then takes the best law of each sight.
+
+    With --points, --distance or --errors the ranges are no tracks, and only their laws are compared.
 
     [bold]Example[/bold]: locbounds fit ranges.csv --anchors anchors.csv --truth truth.csv --select scene=canteen
     --hold-out 4
     """
-    from locbounds.cli.fit_noise import HEADER, compare, with_best_laws
-    from locbounds.fit import fit_scenario, quality_figure
+    from locbounds.cli.fit_noise import compare, compare_only, print_laws, with_best_laws, write
+    from locbounds.errors import InputError
+    from locbounds.fit import errors_of_log, fit_scenario, quality_figure
     from locbounds.fit.quality import PROBABILITIES
+    from locbounds.io.log_columns import LogColumns
     from locbounds.io.scenario_file import dumps
     from locbounds.report.tables import csv_text
 
-    with output_folder(default_out(ranges.name.split(".")[0], out), force=force) as folder:
+    target = default_out(ranges.name.split(".")[0], out)
+    if points is not None or distance is not None or errors is not None:
+        of_tracks = {
+            "--time-offset": time_offset != "0",
+            "--merge": merge,
+            "--every": every != 1,
+            "--per-anchor": per_anchor,
+            "--psd": psd is not None,
+        }
+        for name in (name for name, given in of_tracks.items() if given):
+            raise InputError(f"{name} is for tracks, and these ranges have no order in time", f"Leave {name} out")
+        compare_only(
+            ranges,
+            noise or "auto",
+            target,
+            force=force,
+            json=json,
+            errors=errors,
+            distance=distance,
+            points=points,
+            anchors=anchors,
+            truth=truth,
+            columns=LogColumns.parse(columns or []),
+            select=select,
+            labels=labels,
+            hold_out=hold_out,
+        )
+        return
+    with output_folder(target, force=force) as folder:
         with status("reading") as say:
             log = read(ranges, anchors, truth, select, time_offset, merge, every, columns, labels)
             kept, held = log.hold_out(hold_out) if hold_out is not None else (log, None)
             say(f"fitting {kept.ranges:,} ranges of {len(kept.tracks)} tracks")
             title = f"Fitted to {ranges.name}" + (f", {select}" if select else "")
             fitted = fit_scenario(kept, held_out=held, per_anchor=per_anchor, psd_m2_s3=psd, title=title)
-            laws = {} if noise is None else compare(kept, held, noise, say)
+            errors_m = None if noise is None else errors_of_log(kept, held)
+            laws = None if errors_m is None or noise is None else compare(errors_m, noise, say)
         quality = fitted.quality
-        scenario, comments, notes = with_best_laws(fitted, laws)
+        scenario, comments, notes = with_best_laws(fitted, laws or {})
         folder.write_text("scenario.toml", dumps(scenario, comments))
-        law_rows = [row for rows in laws.values() for row in rows]
-        if law_rows:
-            folder.write_text("noise.csv", csv_text(HEADER, law_rows))
+        law_rows = write(folder, errors_m, laws) if errors_m is not None and laws is not None else []
         quantiles = [f"{kind}_q{100 * p:02.0f}_m" for p in PROBABILITIES for kind in ("measured", "fitted")]
         rows = [
             (q.name, q.ranges, q.mean_m, q.fitted_mean_m, q.std_m, q.fitted_std_m, q.nlos_share, q.ks)
@@ -108,12 +145,8 @@ def fit(
         ("lag in steps", "errors", "explained by the chain", "left in the residuals"),
         [tuple(round(x, 3) if isinstance(x, float) else x for x in row) for row in lags],
     )
-    for name, table in laws.items():
-        print_table(
-            f"Laws of the error, {name}: mean log density (1/m) of held-out errors",
-            HEADER[1:],
-            [row[1:] for row in table],
-        )
+    if laws is not None:
+        print_laws(laws)
     for note in notes:
         typer.echo(note)
     typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")

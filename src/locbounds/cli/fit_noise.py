@@ -1,19 +1,22 @@
-"""The table of laws that ``locbounds fit --noise`` prints, and the best law of each sight."""
+"""What ``locbounds fit --noise`` does: the table and the figure of laws, and the best law of each sight."""
 
 from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from locbounds.fit import LawComparison, RangeLog
+    from locbounds.fit import LawComparison, RangeErrors
 
 HEADER = (
     "errors of",
     "law",
     "held-out",
+    "s.e.",
     "behind best",
-    "+-",
+    "its s.e.",
     "AIC",
     "KS",
     "bound",
@@ -21,7 +24,7 @@ HEADER = (
     "note",
 )
 SIGHTS = ("LOS", "NLOS")
-EVERY = 4  # of the tracks, where none are held out, every so manyth is held out for the comparison
+SIGMAS = 2.0
 
 
 class Laws(dict[str, list[tuple]]):
@@ -30,29 +33,84 @@ class Laws(dict[str, list[tuple]]):
     comparisons: dict[str, "list[LawComparison]"]
 
 
-def compare(kept: "RangeLog", held: "RangeLog | None", noise: str, say: Callable[[str], Any]) -> Laws:
+def compare(errors: "RangeErrors", noise: str, say: Callable[[str], Any]) -> Laws:
     """Fit laws to the errors of every sight, by label, or to all errors where there are no labels."""
     from locbounds.errors import InputError
     from locbounds.fit import LAWS, compare_noise_laws
 
     families = LAWS if noise == "auto" else tuple(name.strip() for name in noise.split(","))
-    if held is None:
-        names = [track.name for track in kept.tracks]
-        if len(names) < 2:
-            raise InputError("one track cannot be split for a comparison of laws", "Give a log of several tracks")
-        kept, held = kept.hold_out(",".join(names[EVERY - 1 :: EVERY] or names[-1:]) + ",")
-    fit, test = kept.errors(), held.errors()
-    known = bool((fit.sight >= 0).any())
     laws = Laws()
     laws.comparisons = {}
-    for name, sight in zip(SIGHTS if known else ("all",), (0, 1) if known else (None,), strict=True):
-        say(f"comparing laws of {name} errors")
-        parts = [e.error_m if sight is None else np.where(e.sight == sight, e.error_m, np.nan) for e in (fit, test)]
-        groups = np.broadcast_to(test.track[:, None], test.error_m.shape)
-        found = compare_noise_laws(*parts, groups=groups, families=families)
-        laws.comparisons[name] = found
-        laws[name] = [_row(name, row) for row in found]
+    for name, part in errors.by_sight().items():
+        fit, test = part.error_m[~part.held], part.error_m[part.held]
+        if not len(fit) and not len(test):
+            continue
+        if not len(fit) or not len(test):
+            raise InputError(
+                f"{'all' if len(test) else 'no'} {name} errors are held out",
+                "Hold out others: --hold-out, on both sides",
+            )
+        say(f"comparing laws of {len(fit):,} {name} errors on {len(test):,}")
+        laws.comparisons[name] = compare_noise_laws(fit, test, groups=part.group[part.held], families=families)
+        laws[name] = [_row(name, row) for row in laws.comparisons[name]]
     return laws
+
+
+def write(folder: Any, errors: "RangeErrors", laws: Laws) -> list[tuple]:
+    """Write noise.csv and noise.png; the rows of all tables."""
+    from locbounds.report.law_plot import law_figure
+    from locbounds.report.tables import csv_text
+
+    rows = [row for table in laws.values() for row in table]
+    folder.write_text("noise.csv", csv_text(HEADER, rows))
+    held = {name: part.error_m[part.held] for name, part in errors.by_sight().items()}
+    figure = law_figure(laws.comparisons, held)
+    folder.write("noise.png", lambda path: figure.savefig(path, dpi=150))
+    return rows
+
+
+def print_laws(laws: Laws) -> None:
+    """The tables for people."""
+    import typer
+
+    from locbounds.cli.output import print_table
+
+    for name, table in laws.items():
+        title = f"Laws of the error, {name}: mean log density (1/m) of held-out errors"
+        shown = [k for k, column in enumerate(HEADER) if column not in ("errors of", "numbers")]
+        print_table(title, [HEADER[k] for k in shown], [[row[k] for k in shown] for row in table])
+        typer.echo(winner(name, laws.comparisons[name]) + "\n")
+
+
+def winner(name: str, rows: "list[LawComparison]") -> str:
+    """Which law is best, and which others the held-out errors do not tell from it, in a sentence."""
+    best = rows[0]
+    if best.fit is None or best.impossible:
+        return f"{name}: every law calls some of the held-out errors impossible."
+    near = [row.family for row in rows[1:] if row.behind <= SIGMAS * row.behind_stderr]
+    also = f"; within {SIGMAS:g} standard errors of it: {', '.join(near)}" if near else ", and no other is near"
+    return f"{name}: {best.family} is best ({_numbers(best.fit.noise)}){also}."
+
+
+def compare_only(ranges: Path, noise: str, out: Path, *, force: bool, json: bool, **options: Any) -> None:
+    """The comparison of laws for errors that are no log of tracks: no scenario comes of them."""
+    import typer
+
+    from locbounds.cli.output import output_folder, print_json, status
+    from locbounds.io.range_errors import read_errors
+
+    with output_folder(out, force=force) as folder:
+        with status("reading") as say:
+            errors = read_errors(ranges, **options)
+            laws = compare(errors, noise, say)
+        rows = write(folder, errors, laws)
+    if json:
+        print_json({"noise": rows, "notes": errors.notes})
+        return
+    print_laws(laws)
+    for note in errors.notes:
+        typer.echo(note)
+    typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")
 
 
 def _row(name: str, row: "LawComparison") -> tuple:
@@ -64,6 +122,7 @@ def _row(name: str, row: "LawComparison") -> tuple:
         name,
         row.family,
         number(row.held_out),
+        number(row.held_out_stderr),
         number(row.behind),
         number(row.behind_stderr),
         "" if fit is None else round(fit.aic, 1),
@@ -75,8 +134,6 @@ def _row(name: str, row: "LawComparison") -> tuple:
 
 
 def _numbers(noise: Any) -> str:
-    from dataclasses import fields
-
     return ", ".join(f"{f.name} {_short(getattr(noise, f.name))}" for f in fields(noise))
 
 
@@ -93,7 +150,9 @@ def with_best_laws(fitted: Any, laws: dict) -> tuple[Any, dict, tuple]:
         return fitted.scenario, fitted.comments, notes
     if set(laws) != set(SIGHTS):
         more = (
-            "The log has no labels: the laws are of all errors, LOS and NLOS together; scenario.toml keeps its chain."
+            f"The labels are all {next(iter(laws))}: scenario.toml keeps its chain."
+            if "all" not in laws
+            else "The log has no labels: the laws are of all errors together; scenario.toml keeps its chain."
         )
         return fitted.scenario, fitted.comments, (*notes, more)
     from locbounds.scenario import Link

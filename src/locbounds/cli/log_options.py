@@ -20,7 +20,11 @@ SelectOption = Annotated[
 ]
 HoldOutOption = Annotated[
     str | None,
-    typer.Option("--hold-out", metavar="TRACKS", help="Tracks kept from the fit: names, or a number (the last ones)."),
+    typer.Option(
+        "--hold-out",
+        metavar="TRACKS",
+        help="Tracks kept from the fit: names, or a number (the last ones); points also by COLUMN=VALUE.",
+    ),
 ]
 TimeOffsetOption = Annotated[
     str, typer.Option("--time-offset", metavar="S|auto", help="Seconds added to the times of the ranges, or auto.")
@@ -34,6 +38,18 @@ EveryOption = Annotated[
 ]
 LabelsOption = Annotated[
     str | None, typer.Option("--labels", metavar="COLUMN", help="Column (ranges or truth) that says los or nlos.")
+]
+ErrorsOption = Annotated[
+    str | None,
+    typer.Option("--errors", metavar="COLUMN", help="Column of the ranges that holds their errors; no other files."),
+]
+DistanceOption = Annotated[
+    str | None,
+    typer.Option("--distance", metavar="COLUMN", help="Column of the ranges with true distances; no other files."),
+]
+PointsOption = Annotated[
+    str | None,
+    typer.Option("--points", metavar="COLUMN", help="Ranges at fixed points: column (ranges, truth) that names them."),
 ]
 ColumnsOption = Annotated[
     list[str] | None,

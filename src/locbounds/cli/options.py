@@ -1,7 +1,7 @@
 """Options that commands share."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,6 +12,25 @@ OutOption = Annotated[
 SeedOption = Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Seed of all random numbers.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print tables as JSON.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Write into a folder, or over a file, that is not ours.")]
+RequirementOption = Annotated[
+    str,
+    typer.Option(
+        "--requirement",
+        metavar="TEXT",
+        help="What to judge the filters' errors by, like '5 m @ 90 %'; e911: 100 m @ 67 %, 300 m @ 95 %; or none.",
+    ),
+]
+
+
+def requirements(text: str) -> tuple[Any, ...]:
+    """What ``--requirement`` asks for; nothing for ``none``.
+
+    >>> requirements("none")
+    ()
+    """
+    from locbounds.requirement import parse
+
+    return () if text.strip().lower() == "none" else parse(text)
 
 
 def default_out(name: str | Path, out: Path | None) -> Path:

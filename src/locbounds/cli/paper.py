@@ -5,13 +5,23 @@ from typing import Annotated
 
 import typer
 
-from locbounds.cli.options import ForceOption, JsonOption, OutOption, SeedOption, default_out
+from locbounds.cli.options import (
+    ForceOption,
+    JsonOption,
+    OutOption,
+    RequirementOption,
+    SeedOption,
+    default_out,
+    requirements,
+)
 from locbounds.cli.output import output_folder, print_json, print_table, status
 from locbounds.cli.paper_names import paper as find_paper
 
 
 def paper(
-    name: Annotated[str, typer.Argument(metavar="PAPER", help="fritsche2013 or mcguire2009", show_default=False)],
+    name: Annotated[
+        str, typer.Argument(metavar="PAPER", help="chen2010, fritsche2013 or mcguire2009", show_default=False)
+    ],
     samples: Annotated[
         int | None,
         typer.Option(
@@ -20,7 +30,15 @@ def paper(
             help="Draws of every bound, in blocks of 2048; by default until the s.e. is below 0.1 %.",
         ),
     ] = None,
-    runs: Annotated[int, typer.Option("--runs", min=2, help="Tracks for every filter (the paper: 20,000).")] = 10_000,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            "--runs",
+            min=2,
+            help="Tracks for every filter; by default 10,000 (the paper: 20,000), for chen2010 400 (the paper: 50).",
+        ),
+    ] = None,
+    requirement: RequirementOption = "e911",
     data: Annotated[
         Path | None,
         typer.Option("--data", metavar="DIR", help="Measured surveys of mcguire2009; by default $LOCBOUNDS_DATA."),
@@ -33,15 +51,21 @@ def paper(
     """Reproduce a paper: its tables and figures, published beside computed with standard errors.
 
     fritsche2013 writes table1.csv, fig1.csv and fig1.png; after Ctrl-C the finished columns of Table I in
-    partial-table1.csv. The table on the screen compares every published entry with the computed one. mcguire2009 writes
-    fig9.csv and fig9.png.
+    partial-table1.csv. The table on the screen compares every published entry with the computed one. chen2010 writes
+    fig1 and fig2 (csv, png), quantiles.csv, segments.csv, settings.csv, bounds.csv and requirement.csv, and says which
+    statements of the paper hold. mcguire2009 writes fig9.csv and fig9.png.
 
     [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
     """
     find_paper(name)
+    wanted = requirements(requirement)
     with output_folder(default_out(name, out), force=force) as folder:
-        if name == "fritsche2013":
-            _fritsche2013(folder, samples, runs, seed, json)
+        if name == "chen2010":
+            from locbounds.cli.paper_chen2010 import chen2010
+
+            chen2010(folder, runs=runs, seed=seed, wanted=wanted, json=json)
+        elif name == "fritsche2013":
+            _fritsche2013(folder, samples, 10_000 if runs is None else runs, seed, json)
         else:
             _mcguire2009(folder, data, seed, json)
 

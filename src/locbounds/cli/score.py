@@ -5,7 +5,16 @@ from typing import Annotated
 
 import typer
 
-from locbounds.cli.options import ForceOption, JsonOption, OutOption, ScenarioArgument, SeedOption
+from locbounds.cli import compliance
+from locbounds.cli.options import (
+    ForceOption,
+    JsonOption,
+    OutOption,
+    RequirementOption,
+    ScenarioArgument,
+    SeedOption,
+    requirements,
+)
 from locbounds.errors import InputError, RefusedError
 
 
@@ -33,6 +42,7 @@ def score(
     rtol: Annotated[
         float | None, typer.Option("--rtol", help="Relative standard error of the bounds; default 1e-3.")
     ] = None,
+    requirement: RequirementOption = "e911",
     seed: SeedOption = 0,
     out: OutOption = None,
     json: JsonOption = False,
@@ -57,6 +67,7 @@ def score(
 
     if estimates is None:
         raise InputError("there are no estimates to score", "Name their file with --estimates")
+    wanted = requirements(requirement)
     model = load(scenario)
     chosen = applicable_bounds(model, bounds)
     if not chosen:
@@ -89,9 +100,13 @@ def score(
         folder.write_text("score.csv", tables.csv_text(SCORE_COLUMNS, _rows(own, results, scores)))
         folder.write_text("rmse.csv", tables.csv_text(tables.RMSE_COLUMNS, tables.rmse_rows([own, *results])))
         folder.write("rmse.png", lambda path: plot.rmse([*results, own], title=model.title).savefig(path, dpi=150))
+    complied = compliance.of_results(wanted, [own])
     if json:
         rows = [dict(zip(SCORE_COLUMNS, row, strict=True)) for row in _rows(own, results, scores)]
-        print_json({"scores": rows, "refused": refused, "verdicts": verdicts, "warnings": own.verdict.warnings})
+        print_json(
+            {"scores": rows, "refused": refused, "verdicts": verdicts, "warnings": own.verdict.warnings}
+            | {"requirement": compliance.plain(complied, own.id)}
+        )
         return
     table = []
     for r in [own, *results]:
@@ -105,6 +120,7 @@ def score(
     )
     for text in verdicts:
         typer.echo(text)
+    compliance.echo(complied)
     for warning in own.verdict.warnings:
         typer.echo(f"warning: {warning}")
     typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from locbounds.cli import compliance
 from locbounds.cli.log_options import (
     AnchorsOption,
     ColumnsOption,
@@ -16,7 +17,16 @@ from locbounds.cli.log_options import (
     TruthOption,
     read,
 )
-from locbounds.cli.options import ForceOption, JsonOption, OutOption, ScenarioArgument, SeedOption, default_out
+from locbounds.cli.options import (
+    ForceOption,
+    JsonOption,
+    OutOption,
+    RequirementOption,
+    ScenarioArgument,
+    SeedOption,
+    default_out,
+    requirements,
+)
 from locbounds.cli.output import count_progress, output_folder, precision_progress, print_json, print_table, status
 from locbounds.errors import InputError
 
@@ -42,6 +52,7 @@ def track(
         float | None, typer.Option("--rtol", help="Relative standard error to reach at every step; default 1e-3.")
     ] = None,
     runs: Annotated[int, typer.Option("--runs", min=2, help="Simulated tracks for every filter.")] = 1_000,
+    requirement: RequirementOption = "e911",
     seed: SeedOption = 0,
     ranges: RangesOption = None,
     anchors: AnchorsOption = None,
@@ -66,6 +77,7 @@ def track(
     """
     from locbounds.io.scenario_file import load
 
+    wanted = requirements(requirement)
     model = load(scenario)
     chosen_bounds = applicable_bounds(model, bounds)
     chosen_filters = _filters(model, filters)
@@ -74,9 +86,9 @@ def track(
     with output_folder(default_out(scenario, out), force=force) as folder:
         if ranges is not None or anchors is not None or truth is not None:
             log = read(ranges, anchors, truth, select, time_offset, merge, every, columns, None)
-            _along_log(model, log, hold_out, chosen_bounds, chosen_filters, rtol, seed, folder, json)
+            _along_log(model, log, hold_out, chosen_bounds, chosen_filters, rtol, seed, folder, json, wanted)
         else:
-            _on_model(model, chosen_bounds, chosen_filters, rtol, runs, seed, folder, json)
+            _on_model(model, chosen_bounds, chosen_filters, rtol, runs, seed, folder, json, wanted)
 
 
 def applicable_bounds(model: "Scenario", ids: str | None) -> "list[Method]":
@@ -105,7 +117,7 @@ def _filters(model: "Scenario", ids: str | None) -> list[Any]:
     return [] if ids == "none" else [registry.load(registry.method(id.strip(), "filter"))() for id in ids.split(",")]
 
 
-def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
+def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted) -> None:
     from locbounds import registry
     from locbounds.evaluation import evaluate_on, quantile
     from locbounds.result import format_with_error, tightest
@@ -128,6 +140,7 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
         raise
     _save(results, model, folder)
     best = tightest(results)
+    complied = compliance.of_results(wanted, results)
 
     rows = []
     for r in results:
@@ -144,7 +157,9 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
             (r.id, r.kind, float(r.mean_position_rmse()), r.mean_position_rmse_stderr(), str(r.verdict))
             for r in results
         ]
-        print_json([dict(zip(keys, value, strict=True)) for value in values])
+        rows = [dict(zip(keys, value, strict=True)) for value in values]
+        extra = [{"requirement": compliance.plain(complied, r.id)} if r.kind == "filter" else {} for r in results]
+        print_json([row | more for row, more in zip(rows, extra, strict=True)])
         return
     print_table(
         f"Position RMSE, mean over steps 0..{model.steps} (± one standard error)",
@@ -156,6 +171,7 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json) -> None:
     elif best:
         names = " and ".join(b.id for b in best)
         typer.echo(f"tightest valid bounds: {names}, equal within four standard errors")
+    compliance.echo(complied)
     for warning in dict.fromkeys(w for r in results for w in r.verdict.warnings):
         typer.echo(f"warning: {warning}")
     typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")
@@ -173,7 +189,7 @@ def _save(results, model, folder) -> None:
         folder.write("rmse.png", lambda path: plot.rmse(results, title=title).savefig(path, dpi=150))
 
 
-def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) -> None:
+def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json, wanted) -> None:
     from locbounds import registry
     from locbounds.fit.held_out import EXPLANATION, along_tracks
     from locbounds.report import tables, track_plot
@@ -198,10 +214,14 @@ def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) 
     ]
     folder.write_text("tracks.csv", tables.csv_text(("method", "kind", "track", "position_rmse_m"), by_track))
     folder.write("rmse.png", lambda path: track_plot.along_tracks(results, width_s=BIN_S).savefig(path, dpi=150))
+    measured = [(r.id, [square[1:] ** 0.5 for square in r.square_m2]) for r in results if r.kind == "filter"]
+    complied = compliance.judged(wanted, measured)
     if json:
-        print_json(
-            [{"method": r.id, "kind": r.kind, "position_rmse_m": r.rmse()[0], "stderr_m": r.rmse()[1]} for r in results]
-        )
+        rows = [
+            {"method": r.id, "kind": r.kind, "position_rmse_m": r.rmse()[0], "stderr_m": r.rmse()[1]} for r in results
+        ]
+        extra = [{"requirement": compliance.plain(complied, r.id)} if r.kind == "filter" else {} for r in results]
+        print_json([row | more for row, more in zip(rows, extra, strict=True)])
         return
     noun = "tracks" if len(log.tracks) > 1 else "track"
     rows = []
@@ -214,5 +234,6 @@ def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json) 
         ["method", "kind", "RMSE", "50 % / 95 % in m"],
         rows,
     )
+    compliance.echo(complied)
     typer.echo(EXPLANATION)
     typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")

@@ -15,6 +15,8 @@ class Estimates(eqx.Module):
         [runs, steps+1, state] in the scenario's state order; row 0 is the prior's mean.
     covariance
         [runs, steps+1, state, state] as the filter believes, or None if the filter was told not to return it.
+    diagnostics
+        What else a filter says about its own work, by name, [runs, ...] each.
 
     Examples
     --------
@@ -28,6 +30,7 @@ class Estimates(eqx.Module):
 
     mean: Float[Array, "runs times state"]
     covariance: Float[Array, "runs times state state"] | None = None
+    diagnostics: dict[str, Array] = eqx.field(default_factory=dict)
 
     @property
     def diverged(self) -> Bool[Array, " runs"]:

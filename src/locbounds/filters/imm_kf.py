@@ -1,5 +1,6 @@
 """IMM-KF: ranges smoothed causally by a two-mode IMM Kalman filter per link, then least squares for the position."""
 
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -13,7 +14,7 @@ from locbounds.filters.least_squares import damped, locate
 from locbounds.filters.lowering import Model, check_measurements, estimates, lower
 from locbounds.filters.over_tracks import over_tracks
 from locbounds.filters.range_update import correct, corrected, direction, no_correction, relative_weights
-from locbounds.filters.tracks_last import dense, materialise, solve, upper
+from locbounds.filters.tracks_last import Symmetric, Vector, dense, materialise, solve, upper
 from locbounds.precision import double_precision
 from locbounds.scenario import Scenario
 
@@ -42,6 +43,92 @@ def range_models(model: Model) -> tuple[Array, Array, Array, Array]:
     return F, Q, mean, P0
 
 
+def range_filter(model: Model) -> tuple[Callable[[Any, Any], Any], Any]:
+    """The two-mode IMM Kalman filter on [range, range rate] of every link: one step, and what it starts from.
+
+    The step takes and returns mode probabilities, means and covariances, arrays [modes, links, tracks], from F, Q, T
+    and ranges of one step, and gives mean and variance of the mixture of modes.
+    """
+    modes = model.means.shape[1]
+    links = len(model.means)
+    _, _, mean_0, P_0 = range_models(model)
+    # [components, modes, links, 1]
+    noises = tuple(jnp.asarray(a).transpose(2, 1, 0)[..., None] for a in (model.weights, model.means, model.variances))
+
+    def smooth(carry: Any, piece: Any) -> Any:
+        mu, x, P = carry
+        F, Q, T, z = piece
+        F, Q, T = F[..., None], Q[..., None], T[..., None]
+
+        def mix(values: Array) -> Array:
+            return jnp.stack([sum(T[:, i, j] * values[i] for i in range(modes)) for j in range(modes)])
+
+        centre = materialise([over_modes(mu * a) for a in x])
+        d = [a - b for a, b in zip(x, centre, strict=True)]
+        c = mix(mu)
+        inverse = materialise(jnp.where(c > TINY, 1.0 / jnp.where(c > TINY, c, 1.0), 0.0))
+        P = {(i, j): mix(mu * (P[i, j] + d[i] * d[j])) * inverse for i, j in P}
+        d = materialise([mix(mu * a) * inverse for a in d])
+        P = {(i, j): P[i, j] - d[i] * d[j] for i, j in P}
+        x = [a + b for a, b in zip(centre, d, strict=True)]
+
+        x, P = materialise(predicted(F, Q, x, P))
+        prediction = x[0], [jnp.ones_like(x[0])]
+        correction = correct(no_correction(x[0], 1), {(0, 0): P[0, 0]}, prediction, z, noises)
+        mu = materialise(relative_weights(c, correction))
+        mu = materialise(mu / over_modes(mu))
+        x, P = materialise(corrected(x, P, correction))
+        return (mu, x, P), materialise(moments(mu, x, P))
+
+    shape = modes, links, 1
+    mu = jnp.broadcast_to(jnp.asarray(model.start).T[..., None], shape)
+    x = [jnp.broadcast_to(mean_0[i][:, None], shape) for i in range(2)]
+    P = {(i, j): jnp.broadcast_to(P_0[i, j][:, None], shape) for i, j in upper(2)}
+    return smooth, (mu, x, P)
+
+
+def over_modes(values: Array) -> Array:
+    """Sum over the first axis, which is short."""
+    return sum(values[j] for j in range(len(values)))  # pyright: ignore[reportReturnType]
+
+
+def predicted(F: Array, Q: Array, x: Vector, P: Symmetric) -> tuple[Vector, Symmetric]:
+    """Mean and covariance of the range state one step later."""
+    x = [F[i, 0] * x[0] + F[i, 1] * x[1] for i in range(2)]
+    FP = [[F[i, 0] * P[0, j] + F[i, 1] * P[min(1, j), max(1, j)] for j in range(2)] for i in range(2)]
+    return x, {(i, j): FP[i][0] * F[j, 0] + FP[i][1] * F[j, 1] + Q[i, j] for i, j in P}
+
+
+def moments(mu: Array, x: Vector, P: Symmetric) -> tuple[Vector, Symmetric]:
+    """Mean and covariance of the mixture of modes."""
+    mean = [over_modes(mu * a) for a in x]
+    d = [a - b for a, b in zip(x, mean, strict=True)]
+    return mean, {(i, j): over_modes(mu * (P[i, j] + d[i] * d[j])) for i, j in P}
+
+
+def place(
+    position: Vector, anchors: Array, ranges: tuple[Vector, Symmetric], *, weighted: bool, covariance: bool
+) -> tuple[Vector, Vector, Array | None]:
+    """Position and velocity from smoothed ranges and rates, and their covariance; least squares from a position."""
+    dim = anchors.shape[1]
+    (r, rate), V = ranges
+    weights = materialise([1.0 / V[i, i] if weighted else jnp.ones_like(r) for i in range(2)])
+    position = materialise(locate(position, anchors, r, weights[0], 1.0 / V[0, 0]))
+    _, u = direction(position, anchors.T[:, :, None])
+
+    gains = []  # d position / d ranges and d velocity / d rates, [space] of [links, tracks]
+    for w in weights:
+        G = {(i, j): jnp.sum(w * u[i] * u[j], axis=0) for i, j in upper(dim)}
+        gains.append(solve(damped(G, 0.0), [w * a for a in u]))
+    velocity = [jnp.sum(g * rate, axis=0) for g in gains[1]]
+    full = gains[0] + gains[1]  # [state] of [links, tracks]
+    spread = None
+    if covariance:
+        spread = {(i, j): jnp.sum(full[i] * full[j] * V[i // dim, j // dim], axis=0) for i, j in upper(2 * dim)}
+        spread = dense(spread)
+    return position, velocity, spread
+
+
 def imm_kf(model: Model, z: Array, *, weighted: bool, covariance: bool) -> tuple[Array, Array | None]:
     """Smooth each link's ranges, then locate.
 
@@ -63,74 +150,35 @@ def imm_kf(model: Model, z: Array, *, weighted: bool, covariance: bool) -> tuple
     covariance
         Whether to return it.
     """
-    links, modes, _ = model.means.shape
     dim, tracks = model.anchors.shape[1], z.shape[-1]
     anchors = jnp.asarray(model.anchors)
-    F_r, Q_r, mean_0, P_0 = range_models(model)
-    # [components, modes, links, 1]
-    noises = tuple(jnp.asarray(a).transpose(2, 1, 0)[..., None] for a in (model.weights, model.means, model.variances))
-
-    def over_modes(values: Array) -> Array:
-        return sum(values[j] for j in range(modes))  # pyright: ignore[reportReturnType]
-
-    def smooth(carry: Any, piece: Any) -> Any:
-        mu, x, P = carry  # arrays [modes, links, tracks]
-        F, Q, T, z = piece
-        F, Q, T = F[..., None], Q[..., None], T[..., None]
-
-        def mix(values: Array) -> Array:
-            return jnp.stack([sum(T[:, i, j] * values[i] for i in range(modes)) for j in range(modes)])
-
-        centre = materialise([over_modes(mu * a) for a in x])
-        d = [a - b for a, b in zip(x, centre, strict=True)]
-        c = mix(mu)
-        inverse = materialise(jnp.where(c > TINY, 1.0 / jnp.where(c > TINY, c, 1.0), 0.0))
-        P = {(i, j): mix(mu * (P[i, j] + d[i] * d[j])) * inverse for i, j in P}
-        d = materialise([mix(mu * a) * inverse for a in d])
-        P = {(i, j): P[i, j] - d[i] * d[j] for i, j in P}
-        x = [a + b for a, b in zip(centre, d, strict=True)]
-
-        x = [F[i, 0] * x[0] + F[i, 1] * x[1] for i in range(2)]
-        FP = [[F[i, 0] * P[0, j] + F[i, 1] * P[min(1, j), max(1, j)] for j in range(2)] for i in range(2)]
-        P = {(i, j): FP[i][0] * F[j, 0] + FP[i][1] * F[j, 1] + Q[i, j] for i, j in P}
-        x, P = materialise((x, P))
-
-        prediction = x[0], [jnp.ones_like(x[0])]
-        correction = correct(no_correction(x[0], 1), {(0, 0): P[0, 0]}, prediction, z, noises)
-        mu = materialise(relative_weights(c, correction))
-        mu = materialise(mu / over_modes(mu))
-        x, P = materialise(corrected(x, P, correction))
-        mean = [over_modes(mu * a) for a in x]
-        d = [a - b for a, b in zip(x, mean, strict=True)]
-        spread = {(i, j): over_modes(mu * (P[i, j] + d[i] * d[j])) for i, j in P}
-        return (mu, x, P), materialise((mean, spread))
+    F_r, Q_r, _, _ = range_models(model)
+    smooth, first = range_filter(model)
 
     def step(carry: Any, piece: Any) -> Any:
         filters, position = carry
-        filters, ((r, rate), V) = smooth(filters, piece)
-        weights = materialise([1.0 / V[i, i] if weighted else jnp.ones_like(r) for i in range(2)])
-        position = materialise(locate(position, anchors, r, weights[0], 1.0 / V[0, 0]))
-        _, u = direction(position, anchors.T[:, :, None])
-
-        gains = []  # d position / d ranges and d velocity / d rates, [space] of [links, tracks]
-        for w in weights:
-            G = {(i, j): jnp.sum(w * u[i] * u[j], axis=0) for i, j in upper(dim)}
-            gains.append(solve(damped(G, 0.0), [w * a for a in u]))
-        velocity = [jnp.sum(g * rate, axis=0) for g in gains[1]]
-        full = gains[0] + gains[1]  # [state] of [links, tracks]
-        spread = None
-        if covariance:
-            spread = {(i, j): jnp.sum(full[i] * full[j] * V[i // dim, j // dim], axis=0) for i, j in upper(2 * dim)}
-            spread = dense(spread)
+        filters, ranges = smooth(filters, piece)
+        position, velocity, spread = place(position, anchors, ranges, weighted=weighted, covariance=covariance)
         return (filters, position), (jnp.stack([*position, *velocity]), spread)
 
-    shape = modes, links, tracks
-    mu = jnp.broadcast_to(jnp.asarray(model.start).T[..., None], shape)
-    x = [jnp.broadcast_to(mean_0[i][:, None], shape) for i in range(2)]
-    P = {(i, j): jnp.broadcast_to(P_0[i, j][:, None], shape) for i, j in upper(2)}
+    first = jax.tree.map(lambda a: jnp.broadcast_to(a, (*a.shape[:2], tracks)), first)
     start = [jnp.broadcast_to(model.m0[i], tracks) for i in range(dim)]
     pieces = F_r, Q_r, jnp.moveaxis(jnp.asarray(model.transitions), 0, 1), z
-    return jax.lax.scan(step, ((mu, x, P), start), pieces)[1]
+    return jax.lax.scan(step, (first, start), pieces)[1]
+
+
+def check_scenario(id: str, scenario: Scenario) -> None:
+    """An InputError if positions cannot be found from ranges and range rates one by one."""
+    if scenario.motion.state_size != 2 * scenario.dim:
+        raise InputError(
+            f"the state has {scenario.motion.state_size} components, {id} needs a position and a velocity",
+            "Use the filter imm-ekf or imm-ekf-factorised",
+        )
+    if len(scenario.links) < scenario.dim:
+        raise InputError(
+            f"{id} cannot locate in {scenario.dim} dimensions with {len(scenario.links)} links",
+            "Use the filter imm-ekf, or add anchors",
+        )
 
 
 class ImmKf(eqx.Module):
@@ -153,7 +201,7 @@ class ImmKf(eqx.Module):
     - hence the same prior enters once per link, as an error that is independent between links, which it is not. This is
       what the algorithm loses against one joint filter: its average position error is 59 to 61 m in the scenario of
       Fritsche et al. 2013, where Table I says 59.4 to 61.6 m and the IMM-EKF reaches 51.5 to 54.6 m;
-    - it is causal: no range after step k enters the position at step k;
+    - it is causal: no range after step k enters the position at step k; :class:`ImmKfSmoother` uses them all;
     - step 0 is the prior's mean and covariance.
 
     The constant range rate misses the turn of the range when the mobile passes an anchor, so that large errors occur.
@@ -199,16 +247,7 @@ class ImmKf(eqx.Module):
             made of positions and velocities.
         """
         z = check_measurements(scenario, z)
-        if scenario.motion.state_size != 2 * scenario.dim:
-            raise InputError(
-                f"the state has {scenario.motion.state_size} components, imm-kf needs a position and a velocity",
-                "Use the filter imm-ekf or imm-ekf-factorised",
-            )
-        if len(scenario.links) < scenario.dim:
-            raise InputError(
-                f"imm-kf cannot locate in {scenario.dim} dimensions with {len(scenario.links)} links",
-                "Use the filter imm-ekf, or add anchors",
-            )
+        check_scenario(self.id, scenario)
         model = lower(scenario)
         results = over_tracks(
             imm_kf,

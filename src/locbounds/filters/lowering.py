@@ -116,13 +116,14 @@ def check_measurements(scenario: Scenario, z: Any) -> Array:
     return z
 
 
-def estimates(scenario: Scenario, mean: Array, covariance: Array | None) -> Estimates:
+def estimates(scenario: Scenario, mean: Array, covariance: Array | None, **diagnostics: Array) -> Estimates:
     """Results of a kernel, [runs, steps+1, state] and [runs, steps+1, state, state], in the scenario's state order."""
     order = state_order(scenario)
-    if order == sorted(order):
-        return Estimates(mean, covariance)
-    back = np.argsort(order)
-    return Estimates(mean[..., back], None if covariance is None else covariance[..., back[:, None], back[None, :]])
+    if order != sorted(order):
+        back = np.argsort(order)
+        mean = mean[..., back]
+        covariance = None if covariance is None else covariance[..., back[:, None], back[None, :]]
+    return Estimates(mean, covariance, diagnostics)
 
 
 def transition_pattern(model: Model) -> Pattern:

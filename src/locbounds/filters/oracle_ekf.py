@@ -26,7 +26,9 @@ from locbounds.precision import double_precision, traced
 from locbounds.scenario import Scenario
 
 
-def oracle_ekf(model: Model, z: Array, sight: Array, *, kinds: Pattern, covariance: bool) -> tuple[Array, Array | None]:
+def oracle_ekf(
+    model: Model, z: Array, sight: Array, *, kinds: Pattern, covariance: bool, printed_gain: bool = False
+) -> tuple[Array, Array | None]:
     """EKF with the noise of the true sight: all ranges of a step linearised at its predicted mean.
 
     Parameters
@@ -39,6 +41,8 @@ def oracle_ekf(model: Model, z: Array, sight: Array, *, kinds: Pattern, covarian
         True sight [steps, links, tracks].
     kinds, covariance
         As in :func:`locbounds.filters.imm_ekf.imm_ekf`.
+    printed_gain
+        See :class:`OracleEkf`.
     """
     modes = model.means.shape[1]
     dim, n, tracks = model.anchors.shape[1], len(model.m0), z.shape[-1]
@@ -56,10 +60,14 @@ def oracle_ekf(model: Model, z: Array, sight: Array, *, kinds: Pattern, covarian
         def link(correction: Any, piece: Any) -> Any:
             z, sight, anchor, noise = piece
             noise = [jnp.sum(jnp.stack([(sight == j) * a[j] for j in range(modes)]), axis=0) for a in noise]
-            return correct(correction, P_pp, direction(x[:dim], anchor), z, noise), None
+            seen = direction(x[:dim], anchor)
+            alone = correct(no_correction(x[0], dim), P_pp, seen, z, noise).y if printed_gain else None
+            return correct(correction, P_pp, seen, z, noise), alone
 
         pieces = z, sight, jnp.asarray(model.anchors), noises
-        correction, _ = jax.lax.scan(link, no_correction(x[0], dim), pieces)
+        correction, alone = jax.lax.scan(link, no_correction(x[0], dim), pieces)
+        if printed_gain:
+            correction = correction._replace(y=[jnp.sum(y, axis=0) for y in alone])
         x, P = materialise(corrected(x, P, correction))
         return (x, P), (jnp.stack(x), dense(P) if covariance else None)
 
@@ -78,6 +86,11 @@ class OracleEkf(eqx.Module):
     ----------
     covariance
         Whether the estimates carry covariances.
+    printed_gain
+        The decentralised EKF of Chen 2010, eqs. (22)-(26), sums one correction per link. With the gain of the fused
+        covariance (26), ``K_i = P H_i^T / R_i``, it is this filter. As printed, (24)-(25) take the covariance that
+        link i alone would leave, so that every link's correction acts on the whole prior uncertainty: together they
+        overshoot. True: as printed. The covariance is (26) in both.
 
     Examples
     --------
@@ -89,13 +102,14 @@ class OracleEkf(eqx.Module):
     """
 
     covariance: bool = eqx.field(static=True, default=True, kw_only=True)
+    printed_gain: bool = eqx.field(static=True, default=False, kw_only=True)
 
     id: ClassVar[str] = "oracle-ekf"
     name: ClassVar[str] = "Oracle EKF"
     sees: ClassVar[frozenset[str]] = frozenset({"ranges", "sight"})
 
     @double_precision
-    def __call__(self, scenario: Scenario, z: Array, seed: int, sight: Array) -> Estimates:
+    def __call__(self, scenario: Scenario, z: Array, seed: int = 0, sight: Array | None = None) -> Estimates:
         """Filter many tracks.
 
         Parameters
@@ -112,8 +126,13 @@ class OracleEkf(eqx.Module):
         Raises
         ------
         InputError
-            If shapes do not match, a range is infinite, or a sight is not one of the scenario's.
+            If shapes do not match, a range is infinite, or the sight is missing or not one of the scenario's.
         """
+        if sight is None:
+            raise InputError(
+                f"{self.id} was not told the sight of the links, which it needs",
+                "Give sight [runs, steps, links] (simulated tracks have it), or use a filter that sees the ranges only",
+            )
         z = check_measurements(scenario, z)
         model = lower(scenario)
         modes = model.means.shape[1]
@@ -132,5 +151,6 @@ class OracleEkf(eqx.Module):
             hypotheses=2,
             kinds=transition_pattern(model),
             covariance=self.covariance,
+            printed_gain=self.printed_gain,
         )
         return estimates(scenario, *results)

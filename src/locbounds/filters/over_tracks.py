@@ -14,8 +14,7 @@ from locbounds.axes import Array
 from locbounds.precision import traced
 
 # XLA's CPU compiler drops optimisation barriers before it fuses; without that pass they hold, here three times as fast.
-# Without the analysis of regions it copies most of what a scan carries, once a step: a fifth of the time.
-CPU_OPTIONS = {"xla_disable_hlo_passes": "cse_barrier_expander", "xla_cpu_copy_insertion_use_region_analysis": True}
+CPU_OPTIONS = {"xla_disable_hlo_passes": "cse_barrier_expander"}
 ELEMENTS = 4096  # hypotheses x tracks per pass on a CPU: large against the cost of a pass, small enough for the cache
 ACCELERATOR_TRACKS = 65_536  # tracks per call elsewhere
 

@@ -146,7 +146,15 @@ def build_sight(sight: SightTable, times: Times) -> Sight:
 
 
 def build_noise(table: NoiseTable) -> Noise:
-    """The law that one noise table describes."""
+    """The law that one noise table describes; that of the mean where it is one of several samples."""
+    law = _one_sample(table)
+    if table.samples is None:
+        return law
+    assert isinstance(law, Gaussian)
+    return Gaussian(law.mean, law.std / np.sqrt(table.samples))
+
+
+def _one_sample(table: NoiseTable) -> Noise:
     if table.sum is not None:
         return reduce(add, map(build_noise, table.sum))
     if table.mixture is not None:

@@ -17,9 +17,7 @@ from locbounds.fit.clock import Stamped, bursts, estimate_offset
 from locbounds.fit.range_log import RangeLog, Track
 from locbounds.io.csv_table import CsvTable
 from locbounds.io.log_columns import AnchorColumns, LogColumns, TruthColumns
-
-LABELS = {"los": 0, "nlos": 1, "": -1, "unknown": -1}
-"""What a label cell may say, in upper or lower case."""
+from locbounds.io.sight_labels import read_labels
 
 MERGE_HINT = 1.5  # ranges per step below which anchors seem to report one after the other
 MERGE_HINT_RANGES = 100
@@ -101,10 +99,12 @@ def read_log(
     tables = {"ranges": CsvTable(ranges, "ranges"), "anchors": CsvTable(anchors, "anchors")}
     if truth is not None:
         tables["truth"] = CsvTable(truth, "truth")
-    selected = _select(tables, select)
+    selected = select_rows(tables, select)
     notes: list[str] = []
 
-    names, places, own = _anchors(tables["anchors"], columns.anchors, tables.get("truth"), columns.truth, dim, notes)
+    names, places, own = anchor_places(
+        tables["anchors"], columns.anchors, tables.get("truth"), columns.truth, dim, notes
+    )
     r, c = tables["ranges"], columns.ranges
     r.need(c.anchor, "anchor")
     r.need(c.range, "range")
@@ -121,7 +121,7 @@ def read_log(
         }
     )
     in_ranges = labels is not None and (labels in r or true is None)
-    frame["sight"] = _labels(r, labels) if in_ranges else -1
+    frame["sight"] = read_labels(r, labels) if labels is not None and in_ranges else -1
     if selected and true is not None:
         frame = frame[frame["track"].isin(list(true))]
         if frame.empty:
@@ -234,7 +234,7 @@ def _thinned(frame: Any, every: int, notes: list[str]) -> Any:
 
 def _labels_of_truth(frame: Any, table: CsvTable, c: TruthColumns, labels: str, timed: bool) -> ndarray:
     """Label of the true position that is nearest in time, or of the same step, for every range; -1 where none is."""
-    sight = _labels(table, labels)
+    sight = read_labels(table, labels)
     track = table.text(c.track) if c.track in table else np.full(len(table), "", dtype=object)
     key = table.numbers(c.time if timed else c.step)
     found = np.full(len(frame), -1)
@@ -308,7 +308,8 @@ def other_unit(values: Float[ndarray, " n"], distance: Float[ndarray, " n"]) -> 
     return best if left[best] < AGREES * np.median(np.abs(values - distance)) else ""
 
 
-def _select(tables: Mapping[str, CsvTable], select: str | Mapping[str, str] | None) -> bool:
+def select_rows(tables: Mapping[str, CsvTable], select: str | Mapping[str, str] | None) -> bool:
+    """Keep the rows that are selected, of every table that has the column; whether anything was asked for."""
     if not select:
         return False
     if isinstance(select, str):
@@ -330,7 +331,8 @@ def _select(tables: Mapping[str, CsvTable], select: str | Mapping[str, str] | No
     return True
 
 
-def _anchors(table: CsvTable, c: AnchorColumns, truth: CsvTable | None, tc: TruthColumns, dim: int | None, notes):
+def anchor_places(table: CsvTable, c: AnchorColumns, truth: CsvTable | None, tc: TruthColumns, dim: int | None, notes):
+    """Names and positions of the anchors, and their positions per track where these differ."""
     table.need(c.anchor, "anchor")
     table.need(c.x, "x")
     table.need(c.y, "y")
@@ -407,21 +409,6 @@ def _truth(table: CsvTable | None, c: TruthColumns, dim: int, *, steps: bool, no
             raise InputError(f"track {name or 1} of {table.path.name} repeats a step", "Give every step once per track")
         found[str(name)] = (t, places[rows], step[rows])
     return found
-
-
-def _labels(table: CsvTable, labels: str | None) -> ndarray:
-    if labels is None:
-        return np.full(len(table), -1)
-    table.need(labels, "label")
-    text = table.text(labels, empty=True)
-    values = np.array([LABELS.get(cell.lower(), -2) for cell in text])
-    bad = np.flatnonzero(values == -2)
-    if bad.size:
-        raise InputError(
-            f'line {table.lines[bad[0]]} of {table.path.name}, column {labels}, says "{text[bad[0]]}"',
-            "Labels are los, nlos or empty",
-        )
-    return values
 
 
 def _check_rows(frame: Any, names: list[str], table: CsvTable, anchors: str | Path, timed: bool) -> None:

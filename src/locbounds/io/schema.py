@@ -202,10 +202,14 @@ class NoiseTable(Section):
     sum: tuple["NoiseTable", ...] | None = key("independent errors that add, [{ std_m = 1 }, { family = .. }]")
     mixture: tuple["NoiseTable", ...] | None = key("one of several errors, [{ share = 0.9, std_m = 1 }, { .. }]")
     share: Probability | None = key("share of this law in a mixture")
+    samples: Whole | None = key(
+        "this Gaussian error is averaged over so many samples per step; a bias that they share stands outside"
+    )
 
     @model_validator(mode="after")
     def _one_way(self):
         check_noise_keys(self)
+        check_samples(self)
         return self
 
     def laws(self) -> dict[str, Any]:
@@ -274,6 +278,23 @@ def check_parts(table: NoiseTable) -> None:
     total = sum(share or 0.0 for share in shares)
     if min(share or 0.0 for share in shares) == 0 or abs(total - 1) > ROUNDING:
         raise fail(f"has a mixture whose shares are {shares}", "Give positive shares that sum to one")
+
+
+def check_samples(table: NoiseTable) -> None:
+    """Raise unless errors that are averaged are Gaussian: only then nothing is lost with the single samples."""
+    if table.samples is not None and not gaussian(table):
+        raise fail(
+            "has samples of an error that is not Gaussian, for which the mean does not stand for all samples",
+            "Put samples beside std_m, and a bias that the samples share outside: "
+            'sum = [{ std_m = 1.6, samples = 10 }, { family = "uniform", .. }]; locbounds.Epoch takes any law',
+        )
+
+
+def gaussian(table: NoiseTable) -> bool:
+    """Whether a noise table describes one Gaussian error."""
+    if table.sum is not None:
+        return all(map(gaussian, table.sum))
+    return table.mixture is None and table.weights is None and table.family in (None, "gaussian")
 
 
 class NlosTable(NoiseTable):

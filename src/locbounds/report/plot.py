@@ -16,6 +16,9 @@ COLOURS = {"bcrb": "C0", "enumer": "C3", "known-sight": "C4", "los-only": "C5"} 
     "imm-kf": "C2",
     "imm-ekf-factorised": "C6",
     "oracle-ekf": "C7",
+    "ekf-banks": "darkgoldenrod",
+    "rbpf": "navy",
+    "imm-kf-smoother": "yellowgreen",
 }  # the same in every figure
 BAND = 1.959963984540054  # a 95 % band
 
