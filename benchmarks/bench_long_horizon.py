@@ -47,7 +47,7 @@ def measure(steps: int, anchors: int, samples: int) -> tuple[float, float, lb.Re
     return time.perf_counter() - start, time.process_time() - cpu, bound
 
 
-def main(steps: int = 10_000, anchors: int = 100, samples: int = 32) -> None:
+def main(steps: int = 10_000, anchors: int = 100, samples: int = 16) -> None:
     for K, M in ((steps // 20, anchors), (steps // 10, anchors), (steps // 20, anchors // 2), (steps, anchors)):
         seconds, cpu, bound = measure(K, M, samples)
         relative = (bound.position_rmse_stderr / bound.position_rmse).values[1:]
