@@ -64,9 +64,9 @@ def read_errors(
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as name:
     ...     path = Path(name) / "ranges.csv"
-    ...     _ = path.write_text("range_m,true_m,los\n5.5,5,1\n9,6,0\n")
+    ...     _ = path.write_text("range_m,true_m,los\n5.5,5,1\n9,6,0\n7,7,1\n8,7.5,1\n")
     ...     read_errors(path, distance="true_m", labels="los").error_m.tolist()
-    [0.5, 3.0]
+    [0.5, 3.0, 0.0, 0.5]
     """
     columns = columns or LogColumns()
     if errors is not None and distance is not None:
