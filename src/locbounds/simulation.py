@@ -104,9 +104,18 @@ def equal_weights(ratios: Float[Array, "steps runs"], groups: int) -> Float[Arra
 def draw_noise(key: Array, noises: tuple[Noise, ...], sight: Int[Array, "*n"]) -> Float[Array, "*n"]:
     """Noise given the sight of every sample; differentiable in the noises.
 
-    Every mode draws from the same key and one of the draws is used, so that equal random numbers are made only once.
+    Every mode draws from the same key and one of the draws is used, so that equal random numbers are made only once:
+    by ``jax.vmap`` where all modes have laws of one structure, because XLA does not see that two loops are the same.
     """
-    draws = [noise.sample(key, sight.shape) for noise in noises]
+    structures = {
+        (tree, tuple((np.shape(x), jnp.result_type(x)) for x in leaves))
+        for leaves, tree in map(jax.tree.flatten, noises)
+    }
+    if len(structures) == 1:
+        laws = jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(x) for x in leaves]), *noises)
+        draws = jax.vmap(lambda law: law.sample(key, sight.shape))(laws)
+    else:
+        draws = [noise.sample(key, sight.shape) for noise in noises]
     w = draws[0]
     for mode, draw in enumerate(draws[1:], start=1):
         w = jnp.where(sight == mode, draw, w)

@@ -14,8 +14,8 @@ noise. ``X_k = V_k' J_z(k) V_k = Cov(E[T_k | track, noise])`` therefore grows by
 with the symbols of :mod:`locbounds.bounds.score_covariance` and one vector per draw and mode,
 ``b(r) = M_k (E[T_{k-1} | r_{k-1} = r] - E[T_{k-1} | r_{k-1} = 0])``, in the place of the differences of all earlier
 steps: ``xi = sum_r (q - p)(r) b(r)``, ``c = sum_r c(r) b(r)``.
-Nothing is left out, whatever the window: it only chooses V. Work per draw and step is
-constant. See docs/theory/score.md.
+Nothing is left out, whatever the window: it only chooses V. Work per draw and step is constant. See
+docs/theory/score.md.
 """
 
 from functools import partial, reduce
@@ -184,7 +184,9 @@ def corrected_bound(
 
     def step(carry, inputs):
         S, missing_pilot, missing, chains, x, drawn = carry
-        (F, Q, transitions, reports, before_D), coming = inputs
+        (F, Q, reports, before_D), coming = inputs
+        transitions = [chain[coming.k - 1] for chain in all_transitions]
+        coming = coming._replace(transitions=[chain[coming.k] for chain in all_transitions])
 
         heard, own = [], jnp.zeros((window * space, window * space))
         for kind, chain, (_, w, u), T, reported in zip(kinds, chains, drawn, transitions, reports, strict=True):
@@ -229,11 +231,15 @@ def corrected_bound(
     now = (
         jnp.concatenate([nothing[0], model.F]),
         jnp.concatenate([nothing[1], model.Q]),
-        [jnp.concatenate([jnp.broadcast_to(jnp.eye(T.shape[-1]), T[:1].shape), T]) for T in steps.transitions],
         [jnp.concatenate([jnp.zeros_like(reports[:1]), reports]) for reports in map(reports_of, kinds)],
         earlier,
     )
+    all_transitions = [  # the largest of the model's numbers: kept once
+        jnp.concatenate([jnp.broadcast_to(jnp.eye(T.shape[-1]), T[:1].shape), T, T[-1:]]) for T in steps.transitions
+    ]
+    steps = steps._replace(transitions=())
     coming = jax.tree.map(lambda a: jnp.concatenate([a, a[-1:]]), steps)  # nobody hears what is drawn after the last
+    coming = coming._replace(k=jnp.arange(1, scenario.steps + 2))
     _, (value, spread, bare, of_pilot, own) = jax.lax.scan(step, first, (now, coming))
     inside = bare[:, index, index].sum(-1)
     return Corrected(value, spread.T, bare, jnp.stack([inside, of_pilot]), own)

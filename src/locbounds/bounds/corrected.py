@@ -22,6 +22,7 @@ from locbounds.verdict import Status, Verdict
 
 FIRST_WINDOW = 2
 LONGEST_WINDOW = 32  # longer ones are taken only where asked for: work per step grows with their square
+FEWEST_GROUPS = 16  # for so many links that these are draws enough
 DRAWS = 3072  # link by link, per block: with fewer links more paths are drawn
 
 
@@ -47,7 +48,8 @@ def _blocks(scenario, expectation, rtol, samples, seed, window, progress):
         raise InputError(f"the window is {window}", "Give a whole number of steps, at least 1")
     scenario = scenario.anonymous()
     seed_key = np.uint32(check_seed(seed))
-    paths = int(np.clip(DRAWS // (GROUPS * len(scenario.links)), 1, 32))
+    groups = GROUPS if GROUPS * len(scenario.links) <= DRAWS else FEWEST_GROUPS
+    paths = int(np.clip(DRAWS // (groups * len(scenario.links)), 1, 32))
     size = min(FIRST_WINDOW if window is None else int(window), scenario.steps)
     index = np.array(scenario.motion.position_index)
 
@@ -62,9 +64,9 @@ def _blocks(scenario, expectation, rtol, samples, seed, window, progress):
                 seed_key,
                 np.uint32(block),
                 increments,
-                groups=GROUPS,
+                groups=groups,
                 paths=paths,
-                pilot=GROUPS,
+                pilot=groups,
                 window=size,
             )
             increments = (block * increments + one.increments) / (block + 1)
@@ -91,13 +93,13 @@ def _blocks(scenario, expectation, rtol, samples, seed, window, progress):
         kept,
         estimate,
         rtol=target,
-        blocks=None if samples is None else -(-samples // (GROUPS * paths)),
-        samples_per_block=GROUPS * paths,
+        blocks=None if samples is None else -(-samples // (groups * paths)),
+        samples_per_block=groups * paths,
         progress=progress,
         first=(first, estimate(first)),
     )
     means = _Sums(*(a / done for a in total))
-    return found, means, size, done * GROUPS * paths
+    return found, means, size, done * groups * paths
 
 
 def corrected(scenario, rtol, samples, seed, expectation, window, progress, why: str) -> Result:

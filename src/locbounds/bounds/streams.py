@@ -3,6 +3,7 @@
 Every step has keys of its own, so that a step's draws do not depend on how many steps come after it.
 """
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -43,7 +44,7 @@ class Step(NamedTuple):
     k: Int[Array, ""]
     F: Float[Array, "state state"]
     root: Float[Array, "state state"]
-    transitions: tuple[Float[Array, "links modes modes"], ...]
+    transitions: Sequence[Float[Array, "links modes modes"]]
     positions: Float[Array, "paths space"] | None
 
 
