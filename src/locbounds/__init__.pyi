@@ -18,7 +18,7 @@ from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
 from .io.surveys import read_survey
-from .measurement import BySight, Range
+from .measurement import Bearing, BySight, Elevation, Function, PathLoss, Range, RangeDifference
 from .model import AdditiveChannel, DensityChannel, DensityMotion, JumpMarkov, jump_markov
 from .motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
 from .noise import (
@@ -40,7 +40,8 @@ from .noise import (
     bhattacharyya,
     minimum_error,
 )
-from .priors import DensityPrior, GaussianPrior
+from .plan import Observations, Plan, aoa, observe, rss, tdoa, toa
+from .priors import DensityPrior, GaussianPrior, PriorMixture, UniformBox, UniformDisc, UniformPolygon
 from .reference import reference
 from .registry import explain
 from .report import plot
@@ -57,6 +58,7 @@ __version__: str
 __all__ = [
     "AdditiveChannel",
     "AlongTrack",
+    "Bearing",
     "BySight",
     "ConstantAcceleration",
     "ConstantVelocity",
@@ -67,6 +69,7 @@ __all__ = [
     "Draws",
     "DwellSight",
     "EkfBanks",
+    "Elevation",
     "Epoch",
     "Estimates",
     "Exponential",
@@ -75,6 +78,7 @@ __all__ = [
     "Fingerprints",
     "FromLogDensity",
     "FromNumPyro",
+    "Function",
     "Gamma",
     "Gaussian",
     "GaussianMixture",
@@ -93,11 +97,16 @@ __all__ = [
     "LogNormal",
     "MarkovSight",
     "Mixture",
+    "Observations",
     "OracleEkf",
+    "PathLoss",
+    "Plan",
     "PrecisionError",
     "Prior",
+    "PriorMixture",
     "RandomWalk",
     "Range",
+    "RangeDifference",
     "Rbpf",
     "RefusedError",
     "Result",
@@ -109,6 +118,10 @@ __all__ = [
     "Times",
     "TruncatedGaussian",
     "Uniform",
+    "UniformBox",
+    "UniformDisc",
+    "UniformPolygon",
+    "aoa",
     "bcrb",
     "bcrb_algorithm1",
     "bcrb_block_tridiagonal",
@@ -124,17 +137,21 @@ __all__ = [
     "load",
     "los_only",
     "minimum_error",
+    "observe",
     "papers",
     "plot",
     "quantile",
     "read_log",
     "read_survey",
     "reference",
+    "rss",
     "save",
     "score",
     "simulate",
     "survey_bound",
     "survey_model",
+    "tdoa",
     "testing",
     "tightest",
+    "toa",
 ]
