@@ -46,11 +46,12 @@ from .reference import reference
 from .registry import explain
 from .report import plot
 from .requirement import comply
-from .result import Result, tightest
+from .result import Result
 from .scenario import Link, Scenario
 from .scoring import Score, score
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
+from .static import Tightest, barankin, bounds_over_noise, ezzb, ls, ml, mmse, tightest, wwb
 from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
 
@@ -115,6 +116,7 @@ __all__ = [
     "Singularity",
     "StudentT",
     "SwitchingMotion",
+    "Tightest",
     "Times",
     "TruncatedGaussian",
     "Uniform",
@@ -122,21 +124,27 @@ __all__ = [
     "UniformDisc",
     "UniformPolygon",
     "aoa",
+    "barankin",
     "bcrb",
     "bcrb_algorithm1",
     "bcrb_block_tridiagonal",
     "bhattacharyya",
+    "bounds_over_noise",
     "comply",
     "discrete_mmse",
     "enumer",
     "evaluate",
     "explain",
+    "ezzb",
     "fit_scenario",
     "jump_markov",
     "known_sight",
     "load",
     "los_only",
+    "ls",
     "minimum_error",
+    "ml",
+    "mmse",
     "observe",
     "papers",
     "plot",
@@ -154,4 +162,5 @@ __all__ = [
     "testing",
     "tightest",
     "toa",
+    "wwb",
 ]

@@ -43,6 +43,9 @@ def paper(
         Path | None,
         typer.Option("--data", metavar="DIR", help="Measured surveys of mcguire2009; by default $LOCBOUNDS_DATA."),
     ] = None,
+    figures: Annotated[
+        str | None, typer.Option("--figures", metavar="NAMES", help="Of mcguire2009, e.g. fig3,fig6; by default all.")
+    ] = None,
     seed: SeedOption = 0,
     out: OutOption = None,
     json: JsonOption = False,
@@ -53,7 +56,7 @@ def paper(
     fritsche2013 writes table1.csv, fig1.csv and fig1.png; after Ctrl-C the finished columns of Table I in
     partial-table1.csv. The table on the screen compares every published entry with the computed one. chen2010 writes
     fig1 and fig2 (csv, png), quantiles.csv, segments.csv, settings.csv, bounds.csv and requirement.csv, and says which
-    statements of the paper hold. mcguire2009 writes fig9.csv and fig9.png.
+    statements of the paper hold. mcguire2009 writes fig3 to fig6 and, if it is given the measured surveys, fig9 (csv, png).
 
     [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
     """
@@ -67,7 +70,9 @@ def paper(
         elif name == "fritsche2013":
             _fritsche2013(folder, samples, 10_000 if runs is None else runs, seed, json)
         else:
-            _mcguire2009(folder, data, seed, json)
+            from locbounds.cli.paper_mcguire2009 import mcguire2009
+
+            mcguire2009(folder, data=data, figures=figures, seed=seed, json=json)
 
 
 def _fritsche2013(folder, samples: int | None, runs: int, seed: int, json: bool) -> None:
@@ -104,44 +109,3 @@ def _fritsche2013(folder, samples: int | None, runs: int, seed: int, json: bool)
     for remark in study.REMARKS:
         typer.echo(remark)
     typer.echo(f"\nwrote {', '.join(str(path) for path in folder.written)}")
-
-
-def _mcguire2009(folder, data: Path | None, seed: int, json: bool) -> None:
-    """Figures of the chapter; each writes its files and returns what is printed."""
-    from locbounds.papers import mcguire2009 as study
-    from locbounds.survey.study import name_of
-
-    with status("mcguire2009: starting") as say:
-        found = study.fig9(data, seed=seed, announce=say)
-    folder.write_text("fig9.csv", study.fig9_csv(found))
-    figure = study.fig9_figure(found)
-    folder.write("fig9.png", lambda path: figure.savefig(path, dpi=150))
-    if json:
-        print_json(
-            {
-                "fig9": {title: [row._asdict() for row in (*s.rows, *s.curve)] for title, s in found.items()},
-                "published": study.PUBLISHED_FIG9._asdict(),
-                "remarks": study.REMARKS,
-            }
-        )
-        return
-    methods = dict.fromkeys(row.method for s in found.values() for row in s.rows)
-    rows = [("noise", *(_noise(s) for s in found.values()))]
-    for method in methods:
-        at = [next((row for row in s.rows if row.method == method), None) for s in found.values()]
-        rows.append((name_of(method), *("" if row is None else _metres(row) for row in at)))
-    print_table("Fig. 9 at each survey's own noise: position RMSE in m (± one standard error)", ["", *found], rows)
-    for remark in study.REMARKS:
-        typer.echo(remark)
-    typer.echo(f"\nwrote {', '.join(str(path) for path in folder.written)}")
-
-
-def _noise(found) -> str:
-    level = found.model.noise_db
-    return f"{level:.2f} dB" if level == level else f"{found.model.noise.deviation.mean():.2f} m"
-
-
-def _metres(row) -> str:
-    if row.rmse_m < 1e-3:
-        return "< 0.001"
-    return f"{row.rmse_m:.3f}" + (f" ± {row.stderr_m:.3f}" if row.stderr_m > 0 else "")

@@ -67,6 +67,22 @@ class Likelihood(NamedTuple):
             return None
         return np.array([float(noise.std) for _, noise, _ in self.noises])
 
+    def each(self, z: tuple[ndarray, ndarray], at: tuple[ndarray, ndarray]) -> Float[ndarray, " n"]:
+        """Log-likelihood of the n-th draw at the n-th place, up to a constant."""
+        total = -0.5 * np.square(z[0] - at[0]).sum(1)
+        for k, table in enumerate(self.tables):
+            total = total + look_up(table, self.noises[k][2], z[1][:, k] - at[1][:, k])
+        return total
+
+    def squares(self, z: tuple[ndarray, ndarray], at: tuple[ndarray, ndarray]) -> Float[ndarray, "*n"]:
+        """Sum of squared differences in the channels' units, angles on the circle; broadcasts."""
+        back = np.linalg.pinv(self.whitener) if len(self.whitener) else np.zeros((0, 0))
+        total = np.square((z[0] - at[0]) @ back.T).sum(-1)
+        for k, (_, _, periodic) in enumerate(self.noises):
+            gap = z[1][..., k] - at[1][..., k]
+            total = total + np.square(gap - 2 * np.pi * np.round(gap / (2 * np.pi)) if periodic else gap)
+        return total
+
     def log(self, z: tuple[ndarray, ndarray], at: tuple[ndarray, ndarray]) -> Float[ndarray, "draws n"]:
         """Log-likelihood of draws at places, up to a constant per draw."""
         white, other = at

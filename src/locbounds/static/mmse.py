@@ -1,4 +1,4 @@
-r"""What is reachable: posterior mean, maximum likelihood and least squares on the same draws.
+r"""The least mean square error: the posterior mean, by quadrature.
 
 Positions and measurements are drawn from the plan by randomised quasi-Monte Carlo. For each draw the posterior over the
 nodes of a quadrature of the prior gives its mean and variance; the mean of the posterior variances is the least mean square
@@ -7,7 +7,6 @@ error, with less noise than that of the squared errors.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -262,26 +261,3 @@ def _power(draws: int) -> int:
     if draws < 2 * REPLICATES:
         raise InputError(f"{draws} draws", f"Give at least {2 * REPLICATES}")
     return int(2 ** np.ceil(np.log2(draws / REPLICATES)))
-
-
-def by_search(
-    objective: Callable[[ndarray, ndarray], ndarray], start: Float[ndarray, "draws space"], width: Float[ndarray, " space"],
-    allowed: Callable[[ndarray], ndarray], *, zooms: int = 14, across: int = 5,
-) -> Float[ndarray, "draws space"]:  # fmt: skip
-    """Local maximum of an objective near a start, by ever smaller grids of allowed places.
-
-    ``objective(which [k], places [k, space])`` is to be largest.
-    """
-    best = start.copy()
-    draws, space = start.shape
-    t = np.linspace(-1, 1, across)
-    steps = np.stack(np.meshgrid(*[t] * space, indexing="ij"), -1).reshape(-1, space)
-    which = np.repeat(np.arange(draws), len(steps))
-    for _ in range(zooms):
-        tried = (best[:, None] + steps * width).reshape(-1, space)
-        value = objective(which, tried)
-        value = np.where(allowed(tried), value, -np.inf).reshape(draws, -1)
-        value[:, len(steps) // 2] = np.where(np.isfinite(value[:, len(steps) // 2]), value[:, len(steps) // 2], -1e300)
-        best = tried.reshape(draws, -1, space)[np.arange(draws), value.argmax(1)]
-        width = width * 0.6
-    return best

@@ -133,7 +133,12 @@ def nodes_for(n: int, share: float) -> int:
 
 
 def _moved(marks: ndarray, shifts: ndarray) -> ndarray:
-    """Where theta is when a shifted copy of it is at a mark."""
+    """Where theta is when a shifted copy of it, or the middle between two, is at a mark.
+
+    In the middle the distances of both copies from the mark are the same: a ridge of what compares them.
+    """
+    if len(shifts) > 1:
+        shifts = np.concatenate([shifts, [0.5 * (u + v) for u, v in itertools.combinations(shifts, 2)]])
     return (marks[:, None] - shifts).reshape(-1, shifts.shape[1])
 
 

@@ -14,11 +14,11 @@ from locbounds.static.overlap import polygon_overlap, shared_nodes
 from locbounds.static.pair_laws import GaussianPairs, PairLaw, Tabulated
 from locbounds.static.support import REACH, Support
 
-BLOCK = 4096  # places evaluated at once: one compilation per plan
+BLOCKS = (4096, 65_536)  # places evaluated at once: two compilations per plan
 
 
 def means(plan: Plan, points: Float[ndarray, "n space"]) -> Float[ndarray, "n channels"]:
-    """Noise-free values, in blocks of one size."""
+    """Noise-free values, in blocks of two sizes."""
     return _in_blocks(plan.means, points)
 
 
@@ -26,13 +26,13 @@ def _in_blocks(function, *points: ndarray) -> ndarray:
     n = len(points[0])
     if n == 0:
         return np.asarray(function(*(np.zeros((1, p.shape[1])) for p in points)))[:0]
-    out = []
-    for start in range(0, n, BLOCK):
-        part = [p[start : start + BLOCK] for p in points]
-        short = BLOCK - len(part[0])
+    out, block = [], BLOCKS[0] if n <= 4 * BLOCKS[0] else BLOCKS[1]
+    for start in range(0, n, block):
+        part = [p[start : start + block] for p in points]
+        short = block - len(part[0])
         if short:
             part = [np.concatenate([p, np.broadcast_to(p[-1:], (short, p.shape[1]))]) for p in part]
-        out.append(np.asarray(function(*part))[: BLOCK - short])
+        out.append(np.asarray(function(*part))[: block - short])
     return np.concatenate(out)
 
 

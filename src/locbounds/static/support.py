@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from locbounds.static.overlap import (
     shared_nodes,
 )
 
+KEPT = 2048  # rules of discs kept in memory: some 50 kB each
 REACH = 16.0  # deviations: two Gaussians so far apart have exp(-32) in common
 
 
@@ -55,15 +57,25 @@ def disc(centre: ndarray, radius: float, marks: ndarray = NO_MARKS) -> Support:
     """Uniform on a disc."""
     centre, radius = np.asarray(centre, float), float(radius)
     level = -np.log(np.pi * radius**2)
+    where = (centre.tobytes(), radius, np.asarray(marks, float).tobytes())
     return Support(
         2,
         lambda points: np.full(len(points), level),
-        lambda shifts, n, rough=None: disc_overlap(centre, radius, shifts, n, marks, rough),
+        lambda shifts, n, rough=None: _disc_rule(
+            *where, np.asarray(shifts, float).tobytes(), n, b"" if rough is None else np.asarray(rough, float).tobytes()
+        ),
         lambda a: 2 * radius,
         True,
         False,
         np.eye(2) * radius**2 / 4,
     )
+
+
+@functools.lru_cache(maxsize=KEPT)
+def _disc_rule(centre: bytes, radius: float, marks: bytes, shifts: bytes, n: int, rough: bytes) -> Rule:
+    """Rules depend on the prior and the anchors' places, not on what is measured: plans and noise levels share them."""
+    c, m, u, r = (np.frombuffer(b).reshape(-1, 2) for b in (centre, marks, shifts, rough))
+    return disc_overlap(c[0], radius, u, n, m, r if len(r) else None)
 
 
 def box(low: ndarray, high: ndarray, marks: ndarray = NO_MARKS) -> Support:

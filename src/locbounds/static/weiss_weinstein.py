@@ -18,7 +18,7 @@ from locbounds.static.pair_laws import GaussianPairs, PairLaw
 from locbounds.static.plan_laws import needs_prior, pair_law, support_of
 from locbounds.static.support import Support
 
-NODES, MOST_NODES = 10, 160  # along a side
+NODES, MOST_NODES = 6, 160  # along a side
 FEW = 8  # while the scale of many test points is searched
 GRID = 25  # lengths swept at first
 DECADES = 3.0  # over which they reach down from the longest

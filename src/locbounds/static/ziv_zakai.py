@@ -18,7 +18,7 @@ from locbounds.static.pair_laws import GaussianPairs, PairLaw
 from locbounds.static.plan_laws import needs_prior, pair_law, support_of
 from locbounds.static.support import Support
 
-NODES, MOST_NODES = 10, 120  # along a side
+NODES, MOST_NODES = 4, 120  # along a side
 SHIFTS = ("along", "free")
 PROBABILITIES = ("general", "equal")
 

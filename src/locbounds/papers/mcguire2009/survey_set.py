@@ -1,8 +1,8 @@
-"""McGuire and Plataniotis, "Accuracy bounds for wireless localization methods" (book chapter, 2009).
+"""Fig. 9: what a survey of received signal strengths tells.
 
-Fig. 9: what a survey of received signal strengths tells. The chapter's own survey (117 seats of a lecture hall, 12
-access points) was not published; the same computation runs here on measured surveys. The formula that the chapter
-gives for it is not a lower bound (docs/theory/survey.md), so that it stands beside the rigorous one, marked.
+The chapter's own survey (117 seats of a lecture hall, 12 access points) was not published; the same computation runs
+here on measured surveys. The formula that the chapter gives for it is not a lower bound (docs/theory/survey.md), so that
+it stands beside the rigorous one, marked.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from locbounds.survey.study import SurveyStudy
 
 DATA = "LOCBOUNDS_DATA"
-FIGURES = ("fig9",)
 
 
 class PublishedSurvey(NamedTuple):

@@ -1,0 +1,54 @@
+"""McGuire and Plataniotis, "Accuracy bounds for wireless localization methods" (book chapter, 2009).
+
+Figs. 3 to 6: bounds and least error of a simple static scenario. Fig. 9: what a survey of signal strengths tells.
+"""
+
+from locbounds.papers.mcguire2009.simple import (
+    CASES,
+    FIGURE_OF,
+    Case,
+    Row,
+    case_rows,
+    figure_csv,
+    simple_figure,
+    simple_study,
+)
+from locbounds.papers.mcguire2009.statements import Statement, statements
+from locbounds.papers.mcguire2009.survey_set import (
+    DATA,
+    PUBLISHED_FIG9,
+    REMARKS,
+    SETS,
+    PublishedSurvey,
+    SurveySet,
+    data_folder,
+    fig9,
+    fig9_csv,
+    fig9_figure,
+)
+
+FIGURES = ("fig3", "fig4", "fig5", "fig6", "fig9")
+
+__all__ = [
+    "CASES",
+    "DATA",
+    "FIGURES",
+    "FIGURE_OF",
+    "PUBLISHED_FIG9",
+    "REMARKS",
+    "SETS",
+    "Case",
+    "PublishedSurvey",
+    "Row",
+    "Statement",
+    "SurveySet",
+    "case_rows",
+    "data_folder",
+    "fig9",
+    "fig9_csv",
+    "fig9_figure",
+    "figure_csv",
+    "simple_figure",
+    "simple_study",
+    "statements",
+]
