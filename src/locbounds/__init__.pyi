@@ -51,6 +51,8 @@ from .scenario import Link, Scenario
 from .scoring import Score, score
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
+from .static import merit
+from .static.crlb import crlb
 from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
 
@@ -127,6 +129,7 @@ __all__ = [
     "bcrb_block_tridiagonal",
     "bhattacharyya",
     "comply",
+    "crlb",
     "discrete_mmse",
     "enumer",
     "evaluate",
@@ -136,6 +139,7 @@ __all__ = [
     "known_sight",
     "load",
     "los_only",
+    "merit",
     "minimum_error",
     "observe",
     "papers",

@@ -10,8 +10,10 @@ from locbounds.assumptions import COMMON
 from locbounds.errors import InputError
 from locbounds.scenario import Scenario
 from locbounds.verdict import (
+    DETERMINED,
     KNOWN_SIGHT,
     LOS_AND_NLOS,
+    REGULAR_PLAN,
     SEPARABLE,
     SMOOTH_NOISE,
     SURVEYED,
@@ -25,6 +27,7 @@ RANGES_AND_SIGHT = frozenset({"ranges", "sight"})
 PAST_AND_FUTURE_RANGES = frozenset({"ranges", "future-ranges"})
 LOS_RANGES_AND_SIGHT = frozenset({"los-ranges", "sight"})
 FINGERPRINT = frozenset({"fingerprint"})
+MEASUREMENT = frozenset({"measurement"})
 
 
 class Method(NamedTuple):
@@ -51,7 +54,7 @@ class Method(NamedTuple):
     conditions
         Under which condition it is valid at all.
     subject
-        What it speaks of: a ``"scenario"`` or a ``"survey"``.
+        What it speaks of: a ``"scenario"``, a ``"survey"`` or a ``"plan"``.
     """
 
     id: str
@@ -151,6 +154,20 @@ METHODS: dict[str, Method] = {
                 "Gaussian noise, the same everywhere, around the mean fingerprints of the survey",
             ),
             "survey",
+        ),
+        Method(
+            "crlb",
+            "CRLB",
+            "bound",
+            "Cramér-Rao bound at a point: no estimator that is unbiased around it has a smaller mean square error.",
+            MEASUREMENT,
+            "locbounds.static.crlb:crlb",
+            ("smooth noise", "estimators unbiased around the point, without prior knowledge"),
+            "Says nothing of estimators that know the area, which may be better where it is large, nor of the large "
+            "errors of ambiguous geometry, where it is far too small; infinite where the geometry is singular.",
+            ("mcguire2009", "torrieri1984", "qi2002"),
+            (DETERMINED, REGULAR_PLAN),
+            subject="plan",
         ),
         Method(
             "imm-ekf",
