@@ -51,7 +51,15 @@ from .scenario import Link, Scenario
 from .scoring import Score, score
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
-from .static import Tightest, barankin, bounds_over_noise, ezzb, ls, ml, mmse, tightest, wwb
+from .static import merit
+from .static.barankin import barankin
+from .static.crlb import crlb
+from .static.estimators import ls, ml
+from .static.mmse import mmse
+from .static.noise_levels import bounds_over_noise
+from .static.tightest import Tightest, tightest
+from .static.weiss_weinstein import wwb
+from .static.ziv_zakai import ezzb
 from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
 
@@ -131,6 +139,7 @@ __all__ = [
     "bhattacharyya",
     "bounds_over_noise",
     "comply",
+    "crlb",
     "discrete_mmse",
     "enumer",
     "evaluate",
@@ -142,6 +151,7 @@ __all__ = [
     "load",
     "los_only",
     "ls",
+    "merit",
     "minimum_error",
     "ml",
     "mmse",

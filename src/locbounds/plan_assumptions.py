@@ -6,7 +6,7 @@ import numpy as np
 
 from locbounds.measurement import Bearing, PathLoss
 from locbounds.plan import Plan
-from locbounds.verdict import Assumption
+from locbounds.verdict import REGULAR_PLAN, Assumption
 
 
 def no_prior(plan: Plan) -> str | None:
@@ -20,25 +20,6 @@ def irregular_prior(plan: Plan) -> str | None:
         return None
     why = plan.prior.irregular()
     return None if why is None else f"{why}: the prior has no finite information"
-
-
-def irregular_channel(plan: Plan) -> str | None:
-    """Why the Fisher information of some channel's noise does not exist, or None."""
-    return _noise(plan, False, "has no finite Fisher information")
-
-
-def undecided_channel(plan: Plan) -> str | None:
-    """Why it is not known whether it exists, or None."""
-    return _noise(plan, None, "is not known to have a finite Fisher information")
-
-
-def _noise(plan: Plan, finite: bool | None, words: str) -> str | None:
-    for group in plan.groups:
-        for name, noise in zip(group.channel_names, group.noises or (), strict=False):
-            regularity = noise.regularity()
-            if regularity.finite is finite:
-                return f"the noise of {name} {words}: {regularity.reason}"
-    return None
 
 
 def discontinuous(plan: Plan) -> str | None:
@@ -89,7 +70,6 @@ def _comes_to(prior: Any, anchor: np.ndarray, *, vertical: bool) -> bool:
 
 WITH_PRIOR = Assumption("the plan has a prior", no_prior)
 REGULAR_PRIOR = Assumption("the prior's density vanishes smoothly where it ends", irregular_prior)
-REGULAR_CHANNELS = Assumption("every channel's noise has a finite Fisher information", irregular_channel, undecided_channel)
 CONTINUOUS = Assumption("every measurement is continuous over the places that the prior allows", discontinuous)
 FINITE_EXPECTATION = Assumption("the expected information is finite", diverging_information)
-REGULAR_PLAN = (WITH_PRIOR, REGULAR_PRIOR, REGULAR_CHANNELS, CONTINUOUS, FINITE_EXPECTATION)
+BAYESIAN_PLAN = (WITH_PRIOR, REGULAR_PRIOR, REGULAR_PLAN, CONTINUOUS, FINITE_EXPECTATION)

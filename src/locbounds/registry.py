@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 from locbounds.assumptions import COMMON
 from locbounds.errors import InputError
 from locbounds.plan import Plan
-from locbounds.plan_assumptions import REGULAR_PLAN, WITH_PRIOR
+from locbounds.plan_assumptions import BAYESIAN_PLAN, WITH_PRIOR
 from locbounds.scenario import Scenario
 from locbounds.verdict import (
+    DETERMINED,
     KNOWN_SIGHT,
     LOS_AND_NLOS,
+    REGULAR_PLAN,
     SEPARABLE,
     SMOOTH_NOISE,
     SURVEYED,
@@ -106,7 +108,7 @@ METHODS: dict[str, Method] = {
             "real errors are correlated in time beyond the chain.",
             ("fritsche2013", "louis1982"),
             (*COMMON, SMOOTH_NOISE),
-            on_plan=REGULAR_PLAN,
+            on_plan=BAYESIAN_PLAN,
         ),
         Method(
             "enumer",
@@ -174,7 +176,7 @@ METHODS: dict[str, Method] = {
             "Weiss-Weinstein bound of a static position with a prior: no estimator has a smaller mean square error, "
             "whatever the prior's support and the noise.",
             MEASUREMENT,
-            "locbounds.static:wwb",
+            "locbounds.static.weiss_weinstein:wwb",
             ("any prior", "any measurement"),
             "Loose at high noise with few test points; neither always above nor always below the EZZB.",
             ("weinstein1988", "mcguire2009"),
@@ -188,7 +190,7 @@ METHODS: dict[str, Method] = {
             "Extended Ziv-Zakai bound of a static position with a prior: no estimator has a smaller mean square error, "
             "whatever the prior's support and the noise.",
             MEASUREMENT,
-            "locbounds.static:ezzb",
+            "locbounds.static.ziv_zakai:ezzb",
             ("any prior", "any measurement"),
             "Bounds one direction at a time, so that its sum over axes is not tight at low noise where the accuracy "
             "differs from place to place.",
@@ -203,12 +205,26 @@ METHODS: dict[str, Method] = {
             "Barankin bound at given places, in the form with several test points: no unbiased estimator has a smaller "
             "variance there.",
             MEASUREMENT,
-            "locbounds.static:barankin",
+            "locbounds.static.barankin:barankin",
             (),
             "Says nothing about biased estimators, and every estimator that uses a prior or an edge is biased.",
             ("rife1975", "mcguire2009"),
             (),
             ("estimators without bias at the place and at all test points",),
+            subject="plan",
+        ),
+        Method(
+            "crlb",
+            "CRLB",
+            "bound",
+            "Cramér-Rao bound at a point: no estimator that is unbiased around it has a smaller mean square error.",
+            MEASUREMENT,
+            "locbounds.static.crlb:crlb",
+            ("smooth noise", "estimators unbiased around the point, without prior knowledge"),
+            "Says nothing of estimators that know the area, which may be better where it is large, nor of the large "
+            "errors of ambiguous geometry, where it is far too small; infinite where the geometry is singular.",
+            ("mcguire2009", "torrieri1984", "qi2002"),
+            (DETERMINED, REGULAR_PLAN),
             subject="plan",
         ),
         Method(
@@ -299,7 +315,7 @@ METHODS: dict[str, Method] = {
             "estimator",
             "Posterior mean by quadrature: the least mean square error that is possible, with its standard error.",
             MEASUREMENT,
-            "locbounds.static:mmse",
+            "locbounds.static.mmse:mmse",
             (),
             "Costs draws times places; it needs the prior and the noise to be right.",
             ("mcguire2009",),
@@ -312,7 +328,7 @@ METHODS: dict[str, Method] = {
             "estimator",
             "Most likely place within the support of the prior, whose density it does not use.",
             MEASUREMENT,
-            "locbounds.static:ml",
+            "locbounds.static.estimators:ml",
             (),
             "Far from the least error at high noise, where it sits on the edge of the support.",
             ("mcguire2009",),
@@ -325,7 +341,7 @@ METHODS: dict[str, Method] = {
             "estimator",
             "Place with the least sum of squared differences, not weighted, in a box three times as wide as the support.",
             MEASUREMENT,
-            "locbounds.static:ls",
+            "locbounds.static.estimators:ls",
             (),
             "Knows neither prior nor noise; wild where the geometry is poor.",
             ("mcguire2009",),

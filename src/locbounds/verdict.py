@@ -147,6 +147,12 @@ def two_points(survey: Any) -> str | None:
     return None if survey.points > 1 else f"the survey has {survey.points} point"
 
 
+DETERMINED = Assumption("at least as many measurements as unknowns", lambda plan: plan.too_few())
+REGULAR_PLAN = Assumption(
+    "every measurement's noise has a finite Fisher information about a shift",
+    lambda plan: plan.irregular_noise(),
+    lambda plan: plan.irregular_noise(None),
+)
 SEPARABLE = Assumption("motion without modes, one chain per link, measurements that do not depend on it", not_separable)
 SMOOTH_NOISE = Assumption("every noise has a finite Fisher information about a shift", regular_noise, undecided_noise)
 KNOWN_SIGHT = Assumption("the sight of every link is known at every step", all_sights_known)

@@ -4,6 +4,7 @@ from abc import abstractmethod
 from typing import Any, ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -22,24 +23,27 @@ class Measurement(eqx.Module):
     the derivative does not exist (:meth:`singular`) it is zero.
     """
 
-    unit: eqx.AbstractVar[str]
-    """``"m"``, ``"dB"``, ``"rad"``, or ``""`` if unknown."""
-
     periodic: ClassVar[bool] = False
     """Whether values that differ by 2 pi are the same (bearings)."""
 
     clocked: ClassVar[bool] = False
     """Whether an offset of the mobile's clock, in metres, adds to the value (times of arrival)."""
 
+    cancels: ClassVar[bool] = False
+    """Whether the derivative is a difference of unit vectors, which may cancel except for rounding."""
+
+    unit: ClassVar[str] = ""
+    """``"m"``, ``"dB"``, ``"rad"``, or empty if unknown."""
+
+    size: ClassVar[int] = 1
+    """Number of values."""
+
+    dim: ClassVar[Any] = None
+    """Number of coordinates of a position; None: any."""
+
     @abstractmethod
     def __call__(self, position: Float[Array, " space"]) -> Any:
         """The value at one position [space]."""
-
-    size: eqx.AbstractVar[int]
-    """Number of values."""
-
-    dim: eqx.AbstractVar[int | None]
-    """Number of coordinates of a position; None: any."""
 
     @abstractmethod
     def singular(self, points: Float[Array, "points space"]) -> Float[Array, " points"]:
@@ -70,5 +74,5 @@ def distance(position: Float[Array, "*n space"], anchor: Float[Array, " space"])
 def far(points: Float[Array, "points space"], anchor: Float[Array, " space"]) -> Float[Array, " points"]:
     """Distance of points from an anchor; NumPy stays NumPy."""
     difference = points - anchor
-    xp = jnp if traced(difference) else np
+    xp = jnp if isinstance(difference, jax.Array) else np
     return xp.sqrt(xp.sum(difference**2, axis=-1))

@@ -36,7 +36,6 @@ class Bearing(Measurement):
     """
 
     anchor: Float[Array, " space"] = eqx.field(converter=float64)
-    size: ClassVar[int] = 1
     unit: ClassVar[str] = "rad"
     periodic: ClassVar[bool] = True
 
@@ -80,7 +79,6 @@ class Elevation(Measurement):
     """
 
     anchor: Float[Array, " 3"] = eqx.field(converter=float64)
-    size: ClassVar[int] = 1
     unit: ClassVar[str] = "rad"
 
     def __check_init__(self):

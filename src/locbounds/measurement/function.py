@@ -39,9 +39,12 @@ class Function(Measurement):
     """
 
     h: Callable[..., Any] = eqx.field(static=True)
-    size: int = eqx.field(static=True, default=1)
-    unit: str = eqx.field(static=True, default="")
-    dim: int | None = eqx.field(static=True, default=None)
+    size: int = eqx.field(static=True)
+    unit: str = eqx.field(static=True)
+    dim: int | None = eqx.field(static=True)
+
+    def __init__(self, h: Callable[..., Any], size: int = 1, unit: str = "", dim: int | None = None):
+        self.h, self.size, self.unit, self.dim = h, size, unit, dim
 
     def __check_init__(self):
         if not callable(self.h):

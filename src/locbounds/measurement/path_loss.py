@@ -44,7 +44,6 @@ class PathLoss(Measurement):
     anchor: Float[Array, " space"] = eqx.field(converter=float64)
     exponent: Scalar = eqx.field(converter=float64, default=3.0)
     near_field_m: Scalar | None = eqx.field(converter=float64, default=None)
-    size: ClassVar[int] = 1
     unit: ClassVar[str] = "dB"
 
     def __check_init__(self):
@@ -68,4 +67,4 @@ class PathLoss(Measurement):
 
     def singular(self, points: Float[Array, "points space"]) -> Float[Array, " points"]:
         d = far(points, self.anchor)
-        return d if self.near_field_m is None else np.abs(d - self.near_field_m)
+        return d if self.near_field_m is None else abs(d - self.near_field_m)

@@ -35,7 +35,6 @@ class Range(Measurement):
     """
 
     anchor: Float[Array, " space"] = eqx.field(converter=float64)
-    size: ClassVar[int] = 1
     unit: ClassVar[str] = "m"
     clocked: ClassVar[bool] = True
 

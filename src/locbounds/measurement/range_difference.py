@@ -3,6 +3,8 @@
 from typing import ClassVar
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from locbounds.axes import Array, Float, Scalar
@@ -38,8 +40,8 @@ class RangeDifference(Measurement):
 
     anchor: Float[Array, " space"] = eqx.field(converter=float64)
     reference: Float[Array, " space"] = eqx.field(converter=float64)
-    size: ClassVar[int] = 1
     unit: ClassVar[str] = "m"
+    cancels: ClassVar[bool] = True
 
     def __check_init__(self):
         if traced(self.anchor, self.reference):
@@ -59,4 +61,5 @@ class RangeDifference(Measurement):
         return distance(position, self.anchor) - distance(position, self.reference)
 
     def singular(self, points: Float[Array, "points space"]) -> Float[Array, " points"]:
-        return np.minimum(far(points, self.anchor), far(points, self.reference))
+        one, two = far(points, self.anchor), far(points, self.reference)
+        return (jnp if isinstance(one, jax.Array) else np).minimum(one, two)

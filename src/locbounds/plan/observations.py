@@ -28,6 +28,9 @@ class Observations(eqx.Module):
         Instead of a covariance: one noise per channel, independent of each other.
     names
         One per measurement, for messages; by default 1, 2, ...
+    station_stds
+        Standard deviations of the stations that dilutions of precision are relative to; by default the channels' own.
+        (For differences of arrival times, those of the arrival times.)
 
     Raises
     ------
@@ -47,10 +50,13 @@ class Observations(eqx.Module):
         converter=lambda noises: None if noises is None else tuple(noises), default=None
     )
     names: tuple[str, ...] = eqx.field(converter=tuple, static=True, default=())
+    station_stds: Float[Array, " stations"] | None = eqx.field(converter=float64, default=None)
 
     def __post_init__(self):
         if not self.names:
             self.names = tuple(str(i + 1) for i in range(len(self.measurements)))
+        if self.station_stds is None and not traced(self.covariance, self.noises):
+            self.station_stds = self.stds
 
     def __check_init__(self):
         if not self.measurements:

@@ -155,6 +155,24 @@ class Plan(eqx.Module):
         found = np.stack(found)
         return found[np.sort(np.unique(found, axis=0, return_index=True)[1])]
 
+    def irregular_noise(self, finite: bool | None = False) -> str | None:
+        """Which channel's noise has no finite Fisher information (None: is not known to have one), or None."""
+        for group in self.groups:
+            for name, noise in zip(group.channel_names, group.noises or (), strict=False):
+                regularity = noise.regularity()
+                if regularity.finite is finite:
+                    what = "has no finite" if finite is False else "is not known to have a finite"
+                    return f"the noise of {name} {what} Fisher information: {regularity.reason}"
+        return None
+
+    def too_few(self) -> str | None:
+        """Why the measurements cannot determine a position anywhere, or None."""
+        unknowns = self.dim + (self.clock_std_m is not None and not np.isfinite(self.clock_std_m))
+        if self.size >= unknowns:
+            return None
+        what = f"{self.dim} coordinates" + (" and a clock" if unknowns > self.dim else "")
+        return f"{self.size} measured number{'s' * (self.size > 1)} cannot determine {what}"
+
     @double_precision
     def means(self, points: Float[Array, "points space"]) -> Float[Array, "points channels"]:
         """Noise-free values at points."""
@@ -188,15 +206,17 @@ class Plan(eqx.Module):
         if self.clock_std_m is None:
             return W
         xp = jnp if traced(W, self.clock_std_m) else np
-        seen = W @ self.clocked.astype(float)
-        total = self.clocked.astype(float) @ seen + 1.0 / xp.asarray(self.clock_std_m) ** 2
+        clocked = np.asarray(self.clocked, dtype=float)
+        seen: Any = W @ clocked
+        total = clocked @ seen + 1.0 / xp.asarray(self.clock_std_m) ** 2
         return W - xp.outer(seen, seen) / total
 
     @property
     @double_precision
     def accuracy_with_clock(self) -> Float[Array, "channels channels"]:
         """Intrinsic accuracies of the channels for a known clock: the inverse covariance if all are Gaussian."""
-        blocks, start = [], 0
+        blocks: list[Any] = []
+        start = 0
         for group in self.groups:
             names, here = group.channel_names, slice(start, start + group.size)
             start = here.stop
@@ -208,13 +228,11 @@ class Plan(eqx.Module):
                 for noise, periodic, name in zip(group.noises or (), self.periodic[here], names, strict=True)
             ]
             blocks.append(jnp.diag(jnp.stack(each)) if traced(each) else np.diag(np.array(each, dtype=float)))
-        from jax.scipy.linalg import block_diag
-
         if traced(blocks):
-            return block_diag(*blocks)
+            return jax.scipy.linalg.block_diag(*blocks)
         from scipy.linalg import block_diag
 
-        return block_diag(*blocks)
+        return np.asarray(block_diag(*blocks))
 
     @cached_property
     def _assembled(self) -> tuple[list, tuple[int, ...], np.ndarray]:

@@ -83,6 +83,7 @@ def tdoa(anchors: Any, std_m: Deviation, *, reference: int = 0, names: Sequence[
         covariance = np.diag([float(noises[i].variance) for i in keep])  # pyright: ignore[reportOptionalMemberAccess]
         names = [names[i] for i in keep] if names else names
         places, reference = places[keep], keep.index(reference) if reference in keep else reference
+    assert covariance is not None
     n = len(places)
     if n < 2:
         raise InputError(f"time differences of arrival of {n} anchor", "Give at least two anchors")
@@ -96,6 +97,7 @@ def tdoa(anchors: Any, std_m: Deviation, *, reference: int = 0, names: Sequence[
         [RangeDifference(places[i], places[reference]) for i in others],
         F @ covariance @ F.T,
         names=[f"{names[i]}-{names[reference]}" for i in others],
+        station_stds=np.sqrt(np.diag(covariance)),
     )
     return Plan([group], **plan)
 

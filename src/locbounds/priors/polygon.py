@@ -6,7 +6,7 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 
-from locbounds.axes import Array, Bool, Float
+from locbounds.axes import Array, Bool, Float, ndarray
 from locbounds.errors import InputError
 from locbounds.priors.position import PositionPrior, as_points, legendre, product
 from locbounds.priors.uniform import EDGE
@@ -83,7 +83,7 @@ class UniformPolygon(PositionPrior):
         return shape
 
     @cached_property
-    def triangles(self) -> Float[Array, "triangles 3 2"]:
+    def triangles(self) -> Float[ndarray, "triangles 3 2"]:
         """Triangles that cover the polygon without overlap."""
         import shapely
 

@@ -6,7 +6,7 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 
-from locbounds.axes import Array, Bool, Float, Scalar
+from locbounds.axes import Array, Bool, Float, Scalar, ndarray
 from locbounds.errors import InputError
 
 
@@ -69,7 +69,7 @@ def as_points(points: Any, dim: int) -> Float[Array, "points space"]:
     return points
 
 
-def legendre(n: int, low: Scalar = 0.0, high: Scalar = 1.0) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
+def legendre(n: int, low: Scalar = 0.0, high: Scalar = 1.0) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
     """Gauss-Legendre nodes and weights of the mean over an interval.
 
     >>> x, w = legendre(3)
@@ -79,10 +79,10 @@ def legendre(n: int, low: Scalar = 0.0, high: Scalar = 1.0) -> tuple[Float[Array
     if n < 1:
         raise InputError(f"{n} nodes", "Give at least 1")
     x, w = np.polynomial.legendre.leggauss(n)
-    return low + (high - low) * 0.5 * (x + 1), 0.5 * w
+    return np.asarray(low + (high - low) * 0.5 * (x + 1)), 0.5 * w
 
 
-def product(*rules: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def product(*rules: tuple[Any, Any]) -> tuple[np.ndarray, np.ndarray]:
     """Tensor product of rules of one variable: points [nodes, variables] and weights.
 
     >>> [a.shape for a in product(legendre(3), legendre(4))]

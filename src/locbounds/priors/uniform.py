@@ -61,7 +61,7 @@ class UniformDisc(PositionPrior):
         """Gauss-Legendre along the radius (weight r), 2 n equal angles."""
         r, w = legendre(n)
         angles = (np.arange(2 * n) + 0.5) * np.pi / n
-        (polar, weights) = product((r, 2 * w * r), (angles, np.full(2 * n, 0.5 / n)))
+        polar, weights = product((r, 2 * w * r), (angles, np.full(2 * n, 0.5 / n)))
         radii = self.radius * polar[:, :1]
         return self.center + radii * np.stack([np.cos(polar[:, 1]), np.sin(polar[:, 1])], axis=1), weights
 

@@ -154,7 +154,8 @@ def case_rows(
     announce: Callable[[str], None] = lambda text: None,
 ) -> list[Row]:  # fmt: skip
     """All methods at all noise levels of a case."""
-    from locbounds.static import bounds_over_noise, mmse
+    from locbounds.static.mmse import mmse
+    from locbounds.static.noise_levels import bounds_over_noise
 
     announce(f"{case.name}: bounds")
     crlb, crlb_error = expected_crlb(case)
