@@ -44,7 +44,7 @@ def diverging_information(plan: Plan) -> str | None:
             what = "angle" if isinstance(m, Bearing) else "strength"
             return (
                 f"the {what} of {name} changes like 1/r near the anchor, where the prior's density is positive: its "
-                "expected information is infinite, the bound zero, and a Monte Carlo value drifts with the number of draws"
+                "expected information is infinite, the bound zero, and a Monte Carlo value drifts with the draws"
                 + ("" if isinstance(m, Bearing) else " (a near-field radius, near_field_m, makes it finite)")
             )
     return None

@@ -339,7 +339,8 @@ METHODS: dict[str, Method] = {
             "ls",
             "Least squares",
             "estimator",
-            "Place with the least sum of squared differences, not weighted, in a box three times as wide as the support.",
+            "Place with the least sum of squared differences, not weighted, in a box three times as wide as "
+            "the support.",
             MEASUREMENT,
             "locbounds.static.estimators:ls",
             (),

@@ -54,8 +54,8 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
         typer.echo(f"- {s.paper}\n  {s.verdict}: {s.why}")
     if found:
         typer.echo(
-            "\nCRLB and BCRB are no bounds here: the prior ends at the rim, and the estimators that it speaks of are biased. "
-            "They are the mean\nof the local bound and the inverse of the mean information; that of RSS and AoA is zero.\n"
+            "\nCRLB and BCRB are no bounds here: the prior ends at the rim, and estimators that know it are biased. "
+            "They are the mean\nof the local bound and the inverse of the mean information; of RSS and AoA it is zero.\n"
         )
     if surveys:
         _print_fig9(surveys)

@@ -29,7 +29,9 @@ DIRECTIONS = 12
 RANK = 1e-10
 
 
-def barankin_matrix(H: Float[ndarray, "space tests"], v: Float[ndarray, "tests channels"]) -> Float[ndarray, "space space"]:
+def barankin_matrix(
+    H: Float[ndarray, "space tests"], v: Float[ndarray, "tests channels"]
+) -> Float[ndarray, "space space"]:
     """The bound from test vectors H and the whitened differences ``v_i = W (m(theta + h_i) - m(theta))``.
 
     Rows are scaled by ``exp(-|v_i|^2 / 2)``, so that far test points vanish instead of overflowing.
@@ -39,7 +41,11 @@ def barankin_matrix(H: Float[ndarray, "space tests"], v: Float[ndarray, "tests c
     0.25
     """
     square = np.square(v).sum(1)
-    B = np.exp(-0.5 * (square[:, None] + square)) * np.expm1(v @ v.T) if np.max(square, initial=0) < 300 else _far(v, square)
+    B = (
+        np.exp(-0.5 * (square[:, None] + square)) * np.expm1(v @ v.T)
+        if np.max(square, initial=0) < 300
+        else _far(v, square)
+    )
     moved = H * np.exp(-0.5 * square)
     size = np.sqrt(np.maximum(np.diagonal(B), 0.0))
     keep = (size > 0) & (square < 600)
@@ -56,9 +62,7 @@ def _far(v: ndarray, square: ndarray) -> ndarray:
 
 
 @double_precision
-def barankin(
-    plan: Plan, points: Any, *, tests: Float[ndarray, "space tests"] | None = None
-) -> Result | list[Result]:
+def barankin(plan: Plan, points: Any, *, tests: Float[ndarray, "space tests"] | None = None) -> Result | list[Result]:
     """Barankin bound on the variance of unbiased estimators at given places.
 
     Parameters
@@ -68,9 +72,9 @@ def barankin(
     points
         One place [space] or several [points, space], in metres.
     tests
-        Test vectors [space, tests] in metres; by default short ones along the axes, which give the Cramér-Rao bound, and
-        ten lengths in twelve directions, up to 34 deviations of it. Where the place cannot be told locally, lengths are
-        relative to the distance of the anchors.
+        Test vectors [space, tests] in metres; by default short ones along the axes, which give the Cramér-Rao bound,
+        and ten lengths in twelve directions, up to 34 deviations of it. Where the place cannot be told locally, lengths
+        are relative to the distance of the anchors.
 
     Returns
     -------
@@ -94,7 +98,8 @@ def barankin(
     >>> import locbounds as lb
     >>> plan = lb.toa([[0, 15], [-13, -7.5], [13, -7.5]], 2.0)
     >>> print(lb.barankin(plan, [1.0, 2.0]))
-    Barankin bound: position RMSE 2.317 m at (1, 2); valid under (estimators without bias at the place and at all test points)
+    Barankin bound: position RMSE 2.338 m at (1, 2);
+    valid under (estimators without bias at the place and at all test points)
     """
     law = pair_law(plan)
     if not isinstance(law, GaussianPairs) or np.any(np.isfinite(law.period) & (law.std > 0.2)):
@@ -119,7 +124,9 @@ def barankin(
         matrix = barankin_matrix(H, gap @ law.whitener.T)
         where = "at (" + ", ".join(f"{x:g}" for x in place) + ")"
         diagnostics = {"tests_m": H, "point_m": place}
-        out.append(static_result("barankin", matrix, verdict, "several test points", track=where, diagnostics=diagnostics))
+        out.append(
+            static_result("barankin", matrix, verdict, "several test points", track=where, diagnostics=diagnostics)
+        )
     return out[0] if single else out
 
 

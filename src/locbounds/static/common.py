@@ -28,14 +28,15 @@ def verdict_of(id: str, plan: Plan, conditions: tuple[str, ...] = ()) -> Verdict
     found = method(id).verdict(plan, conditions)
     if found.status is Status.REFUSED:
         raise RefusedError(
-            f"{method(id).name} does not apply: {'; '.join(found.reasons)}", f"locbounds explain {id} says what it needs"
+            f"{method(id).name} does not apply: {'; '.join(found.reasons)}",
+            f"locbounds explain {id} says what it needs",
         )
     return found
 
 
 def check_rtol(rtol: Any) -> float:
     """Raise an InputError unless a precision can be asked for."""
-    if not (np.isscalar(rtol) and np.isfinite(rtol) and 0 < float(rtol) <= MOST_RTOL):  # pyright: ignore
+    if not (isinstance(rtol, int | float | np.number) and 0 < float(rtol) <= MOST_RTOL):
         raise InputError(f"rtol is {rtol}", f"Give a number between 0 and {MOST_RTOL}, for example 1e-3")
     return float(rtol)
 

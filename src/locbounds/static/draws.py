@@ -36,7 +36,7 @@ def places(prior: PositionPrior, u: Float[ndarray, "n space"]) -> Float[ndarray,
             mine = k == part
             out[mine] = places(law, np.column_stack([rest[mine], u[mine, 1:]]))
         return out
-    return prior.sample(len(u), seed=int(u[0, 0] * 2**31))
+    return np.asarray(prior.sample(len(u), seed=int(u[0, 0] * 2**31)))
 
 
 def _pick(shares: ndarray, u: ndarray) -> tuple[ndarray, ndarray]:

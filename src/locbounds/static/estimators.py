@@ -55,13 +55,13 @@ def ml(plan: Plan, *, draws: int = DRAWS, seed: int = 0) -> Result:
     verdict, law = verdict_of("ml", plan), likelihood(plan)
     drawn = draw(plan, law, _power(draws), REPLICATES, check_seed(seed))
     nodes = nodes_of(plan, law, NODES)
-    low, high = prior.bounds()
+    low, high = (np.asarray(x) for x in prior.bounds())
 
     def objective(which: ndarray, places: ndarray) -> ndarray:
         return law.each(_pick(drawn, which), law.features(places))
 
     start = posterior(law, nodes, drawn).likeliest
-    found = search(objective, start, 2 * (high - low) / NODES, prior.inside)
+    found = search(objective, start, 2 * (high - low) / NODES, lambda at: np.asarray(prior.inside(at)))
     return _scored("ml", found, drawn, verdict, "search within the support", seed)
 
 
@@ -91,7 +91,7 @@ def ls(plan: Plan, *, draws: int = DRAWS, seed: int = 0) -> Result:
     prior = needs_prior(plan, "an average over positions")
     verdict, law = verdict_of("ls", plan), likelihood(plan)
     drawn = draw(plan, law, _power(draws), REPLICATES, check_seed(seed))
-    low, high = prior.bounds()
+    low, high = (np.asarray(x) for x in prior.bounds())
     middle, half = 0.5 * (low + high), 0.5 * WIDER * (high - low)
     t = np.linspace(-1, 1, 2 * NODES + 1 if plan.dim < 3 else 25)
     grid = middle + half * np.stack(np.meshgrid(*[t] * plan.dim, indexing="ij"), -1).reshape(-1, plan.dim)
@@ -131,9 +131,11 @@ def _scored(id: str, found: ndarray, drawn: Drawn, verdict, how: str, seed: int)
 
 
 def search(
-    objective: Callable[[ndarray, ndarray], ndarray], start: Float[ndarray, "draws space"], width: Float[ndarray, " space"],
+    objective: Callable[[ndarray, ndarray], ndarray],
+    start: Float[ndarray, "draws space"],
+    width: Float[ndarray, " space"],
     allowed: Callable[[ndarray], ndarray],
-) -> Float[ndarray, "draws space"]:  # fmt: skip
+) -> Float[ndarray, "draws space"]:
     """Local maximum of an objective near a start, by ever smaller grids of allowed places.
 
     Parameters

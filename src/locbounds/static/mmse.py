@@ -1,8 +1,8 @@
 r"""The least mean square error: the posterior mean, by quadrature.
 
 Positions and measurements are drawn from the plan by randomised quasi-Monte Carlo. For each draw the posterior over the
-nodes of a quadrature of the prior gives its mean and variance; the mean of the posterior variances is the least mean square
-error, with less noise than that of the squared errors.
+nodes of a quadrature of the prior gives its mean and variance; the mean of the posterior variances is the least mean
+square error, with less noise than that of the squared errors.
 """
 
 from __future__ import annotations
@@ -75,17 +75,25 @@ class Nodes(NamedTuple):
     log_weights: Float[ndarray, " n"]
     features: tuple[ndarray, ndarray]
 
+    def only(self, which: ndarray) -> Nodes:
+        """Some of the nodes."""
+        white, other = self.features
+        return Nodes(self.points[which], self.log_weights[which], (white[which], other[which]))
+
 
 def nodes_of(plan: Plan, law: Likelihood, n: int) -> Nodes:
     """Of n nodes along a line."""
-    points, weights = needs_prior(plan, "an average over positions").nodes(n)
+    points, weights = map(np.asarray, needs_prior(plan, "an average over positions").nodes(n))
     keep = weights > 0
     points, weights = points[keep], weights[keep]
     return Nodes(points, np.log(weights), law.features(points))
 
 
 def posterior(law: Likelihood, nodes: Nodes, drawn: Drawn) -> Posterior:
-    """Posterior of every draw; draws that are close together share the nodes that matter to them."""
+    """Posterior of every draw; draws that are close together share the nodes that matter to them.
+
+    Where no node is possible (noise with an edge), the posterior is the prior: finer nodes are needed.
+    """
     order = _neighbours_together(drawn.places)
     count, space = drawn.places.shape
     mean, likeliest = np.empty((2, count, space))
@@ -93,13 +101,14 @@ def posterior(law: Likelihood, nodes: Nodes, drawn: Drawn) -> Posterior:
     step = int(np.clip(TABLE // len(nodes.points), 1, FACE))
     for start in range(0, count, step):
         part = order[start : start + step]
-        z = tuple(m[part] for m in drawn.measured)
+        z = (drawn.measured[0][part], drawn.measured[1][part])
         near = _relevant(law, nodes, z)
-        at = nodes if near is None else Nodes(nodes.points[near], nodes.log_weights[near], tuple(f[near] for f in nodes.features))  # pyright: ignore # fmt: skip
-        log = law.log(z, at.features)  # pyright: ignore[reportArgumentType]
+        at = nodes if near is None else nodes.only(near)
+        log = law.log(z, at.features)
         likeliest[part] = at.points[log.argmax(1)]
         log += at.log_weights
-        log -= log.max(1, keepdims=True)
+        top = log.max(1, keepdims=True)
+        log = np.where(np.isfinite(top), log - np.where(np.isfinite(top), top, 0.0), at.log_weights)  # else: the prior
         weight = np.exp(log)
         weight /= weight.sum(1, keepdims=True)
         middle = at.points.mean(0)
@@ -125,9 +134,9 @@ def _neighbours_together(points: ndarray) -> ndarray:
 def _relevant(law: Likelihood, nodes: Nodes, z: tuple[ndarray, ...]) -> ndarray | None:
     """Nodes whose likelihood counts for any of the draws: those near them in the space of the measurements.
 
-    With c the middle of the draws and r their distance from it, a node at a distance of more than
-    ``r + sqrt(b^2 + 2 * SMALL)`` from c is less likely than one at a distance b from a draw by e^SMALL. Distances are in
-    deviations; those of narrow angles on the circle.
+    With c one of the draws and r the largest distance of another from it, a node at a distance of more than
+    ``r + sqrt(b^2 + 2 * SMALL)`` from c is less likely than one at a distance b from a draw by e^SMALL. Distances are
+    in deviations; those of narrow angles on the circle.
     """
     width = law.angles
     if width is None:
@@ -167,7 +176,7 @@ def choose_nodes(plan: Plan, law: Likelihood, drawn: Drawn, rtol: float) -> tupl
 
 def _some(drawn: Drawn, count: int) -> Drawn:
     pick = np.linspace(0, len(drawn.places) - 1, min(count, len(drawn.places))).astype(int)
-    return Drawn(drawn.places[pick], tuple(m[pick] for m in drawn.measured))  # pyright: ignore[reportArgumentType]
+    return Drawn(drawn.places[pick], (drawn.measured[0][pick], drawn.measured[1][pick]))
 
 
 class Reached(NamedTuple):
@@ -233,6 +242,7 @@ def mmse(plan: Plan, *, rtol: float = 2e-3, draws: int | None = None, seed: int 
     >>> bool(lb.ezzb(plan).position_mse < least.position_mse), least.relative_stderr() < 0.01
     (True, True)
     """
+    needs_prior(plan, "an average over positions")
     verdict, rtol = verdict_of("mmse", plan), check_rtol(rtol)
     law, seed = likelihood(plan), check_seed(seed)
     nodes = None

@@ -87,7 +87,8 @@ def bounds_over_noise(
         roots = [float(np.sqrt(np.trace(b.matrix))) for b in (wwb, old)]
         ezzb = float(np.sqrt(sums.axes_m2[k].sum()))
         length = float(wwb.tests[0, 0])
-        found.append(Level(scale, *roots, ezzb, wwb.error, old.error, float(sums.error[k]), length))
+        errors = wwb.error, old.error, float(sums.error[k])
+        found.append(Level(scale, roots[0], roots[1], ezzb, *errors, length))
     return found
 
 

@@ -8,30 +8,15 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from locbounds.axes import Float, ndarray
 
 TABLE = 513  # differences at which the coefficient of a wrapped normal law is tabulated
+WAVES = 0.3  # deviation over period above which a wrapped density is a short Fourier series
 NARROW = 0.02  # deviation over period below which no table is needed
-
-
-class PairLaw(Protocol):
-    """What a bound asks of a measurement law."""
-
-    def pairs(self, a: Float[ndarray, "n space"], b: Float[ndarray, "n space"]) -> ndarray:
-        """Statistics of pairs of places, first axis the pairs."""
-        ...
-
-    def log_affinity(self, pairs: ndarray, scale: float) -> Float[ndarray, " n"]:
-        """Logarithm of the Bhattacharyya coefficient."""
-        ...
-
-    def error(self, pairs: ndarray, scale: float) -> Float[ndarray, " n"]:
-        """Least error probability between equally likely places, or a lower bound on it."""
-        ...
 
 
 def gaussian_error(distance: ndarray, log_odds: ndarray) -> ndarray:
@@ -48,8 +33,8 @@ def gaussian_error(distance: ndarray, log_odds: ndarray) -> ndarray:
     -----
     ``q Q(d/2 + l/d) + (1 - q) Q(d/2 - l/d)`` with ``l = log q/(1 - q)``; the smaller of q and 1 - q at d = 0.
 
-    >>> float(gaussian_error(np.array(0.0), np.array(0.0))), round(float(gaussian_error(np.array(2.0), np.array(0.0))), 6)
-    (0.5, 0.158655)
+    >>> gaussian_error(np.array([0.0, 2.0, 0.0]), np.array([0.0, 0.0, np.log(3.0)])).round(6).tolist()
+    [0.5, 0.158655, 0.25]
     """
     from scipy.special import expit, ndtr
 
@@ -99,6 +84,7 @@ class GaussianPairs(NamedTuple):
         return np.column_stack([white.sum(-1), white[:, ~round_].sum(-1), gap[:, round_]])
 
     def log_affinity(self, pairs: ndarray, scale: float) -> ndarray:
+        """Logarithm of the Bhattacharyya coefficient of pairs of places."""
         if pairs.shape[1] == 1:
             return pairs[:, 0] / (-8 * scale**2)
         total = pairs[:, 1] / (-8 * scale**2)
@@ -108,6 +94,7 @@ class GaussianPairs(NamedTuple):
         return total
 
     def error(self, pairs: ndarray, scale: float) -> ndarray:
+        """Least error probability between equally likely places, or a lower bound on it."""
         from scipy.special import ndtr
 
         return ndtr(np.sqrt(pairs[:, 0]) / (-2 * scale))
@@ -131,6 +118,10 @@ class Tabulated(NamedTuple):
 
     def error(self, pairs: ndarray, scale: float) -> ndarray:
         return self.minimum_error(pairs[:, 0], pairs[:, 1])
+
+
+PairLaw = GaussianPairs | Tabulated
+"""What a bound asks of a measurement law: ``pairs``, ``log_affinity`` and ``error``."""
 
 
 def wrapped_log_affinity(difference: ndarray, std: float, period: float = 2 * np.pi) -> ndarray:
@@ -167,10 +158,12 @@ def _wrapped_table(std: float) -> Callable[[ndarray], ndarray]:
 
     grid = np.linspace(0.0, 0.5, TABLE)
     x = np.arange(512) / 512
-    copies = np.arange(-(int(np.ceil(9 * std)) + 1), int(np.ceil(9 * std)) + 2)
+    copies, waves = np.arange(-4, 5), np.arange(1, 9)
 
     def log_density(at: ndarray) -> ndarray:
         at = at - np.round(at)
+        if std > WAVES:
+            return np.log1p(2 * np.cos(2 * np.pi * at[..., None] * waves) @ np.exp(-2 * (np.pi * std * waves) ** 2))
         return logsumexp(-0.5 * ((at[..., None] + copies) / std) ** 2, axis=-1) - np.log(std * np.sqrt(2 * np.pi))
 
     total = 0.5 * (log_density(x) + log_density(x - grid[:, None]))

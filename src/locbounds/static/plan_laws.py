@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from locbounds.axes import Float, ndarray
+from locbounds.axes import Array, Float, ndarray
 from locbounds.errors import InputError
 from locbounds.plan import Plan
-from locbounds.precision import double_precision
 from locbounds.priors import GaussianPrior, PositionPrior, UniformBox, UniformDisc, UniformPolygon
 from locbounds.static import support as supports
 from locbounds.static.overlap import polygon_overlap, shared_nodes
@@ -86,15 +85,17 @@ def needs_prior(plan: Plan, name: str) -> PositionPrior:
     return plan.prior
 
 
-def support_of(prior: PositionPrior, marks: ndarray | None = None) -> Support:
+def support_of(prior: PositionPrior, marks: Array | None = None) -> Support:
     """Density and overlaps of a prior; ``marks`` are the anchors, at which integrands are rough."""
     marks = supports.NO_MARKS if marks is None or not len(marks) else np.asarray(marks, float)
     if isinstance(prior, UniformDisc):
-        return supports.disc(prior.center, float(prior.radius), marks)
+        return supports.disc(np.asarray(prior.center), float(prior.radius), marks)
     if isinstance(prior, UniformBox):
-        return supports.box(prior.low, prior.high, marks if prior.dim == marks.shape[1] else supports.NO_MARKS)
+        return supports.box(
+            np.asarray(prior.low), np.asarray(prior.high), marks if prior.dim == marks.shape[1] else supports.NO_MARKS
+        )
     if isinstance(prior, GaussianPrior):
-        return supports.gaussian(prior.mean, prior.covariance)
+        return supports.gaussian(np.asarray(prior.mean), np.asarray(prior.covariance))
     covariance = np.asarray(prior.covariance)
     if isinstance(prior, UniformPolygon):
         level = -np.log(prior.area)
@@ -107,7 +108,15 @@ def support_of(prior: PositionPrior, marks: ndarray | None = None) -> Support:
             False,
             covariance,
         )
-    low, high = prior.bounds()
+
+    def log_density(points: ndarray) -> ndarray:
+        return np.asarray(prior.log_density(points))
+
+    def nodes(n: int) -> tuple[ndarray, ndarray]:
+        points, weights = prior.nodes(n)
+        return np.asarray(points), np.asarray(weights)
+
+    low, high = (np.asarray(x) for x in prior.bounds())
     whole = bool(np.all(prior.inside(np.stack([low - 100 * (high - low), high + 100 * (high - low)]))))
 
     def reach(a: ndarray) -> float:
@@ -117,8 +126,8 @@ def support_of(prior: PositionPrior, marks: ndarray | None = None) -> Support:
 
     return Support(
         prior.dim,
-        prior.log_density,
-        lambda shifts, n, rough=None: shared_nodes(*prior.nodes(3 * n), prior.log_density, shifts),
+        log_density,
+        lambda shifts, n, rough=None: shared_nodes(*nodes(3 * n), log_density, shifts),
         reach,
         False,
         whole,

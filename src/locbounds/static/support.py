@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from locbounds.static.overlap import (
     box_overlap,
     disc_overlap,
     gaussian_overlap,
-    polygon_overlap,
-    shared_nodes,
 )
 
 KEPT = 2048  # rules of discs kept in memory: some 50 kB each
@@ -53,7 +51,7 @@ class Support(NamedTuple):
     covariance: Float[ndarray, "space space"]
 
 
-def disc(centre: ndarray, radius: float, marks: ndarray = NO_MARKS) -> Support:
+def disc(centre: Any, radius: float, marks: ndarray = NO_MARKS) -> Support:
     """Uniform on a disc."""
     centre, radius = np.asarray(centre, float), float(radius)
     level = -np.log(np.pi * radius**2)
@@ -78,7 +76,7 @@ def _disc_rule(centre: bytes, radius: float, marks: bytes, shifts: bytes, n: int
     return disc_overlap(c[0], radius, u, n, m, r if len(r) else None)
 
 
-def box(low: ndarray, high: ndarray, marks: ndarray = NO_MARKS) -> Support:
+def box(low: Any, high: Any, marks: ndarray = NO_MARKS) -> Support:
     """Uniform on a box."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     level = -np.sum(np.log(high - low))
@@ -98,7 +96,7 @@ def box(low: ndarray, high: ndarray, marks: ndarray = NO_MARKS) -> Support:
     )
 
 
-def gaussian(mean: ndarray, covariance: ndarray) -> Support:
+def gaussian(mean: Any, covariance: Any) -> Support:
     """Gaussian."""
     mean, covariance = np.asarray(mean, float), np.asarray(covariance, float)
     root = np.linalg.cholesky(covariance)

@@ -112,7 +112,7 @@ def ezzb(
     >>> import locbounds as lb
     >>> plan = lb.toa([[0, 15], [-13, -7.5], [13, -7.5]], 2.0, prior=lb.UniformDisc([0, 0], 15))
     >>> print(lb.ezzb(plan))
-    EZZB: position RMSE 2.216 m; valid (any prior, any measurement)
+    EZZB: position RMSE 2.215 m; valid (any prior; any measurement)
     """
     prior = needs_prior(plan, "the Ziv-Zakai bound")
     verdict, rtol = verdict_of("ezzb", plan), check_rtol(rtol)
@@ -128,7 +128,14 @@ def ezzb(
         axes = (a / np.sqrt(weight))[None]
     support, law = support_of(prior, plan.anchors), pair_law(plan)
     found = over_axes(
-        support, law, axes, [1.0], free=shifts == "free", valley=valley_filling, equal=probabilities == "equal", rtol=rtol
+        support,
+        law,
+        axes,
+        [1.0],
+        free=shifts == "free",
+        valley=valley_filling,
+        equal=probabilities == "equal",
+        rtol=rtol,
     )
     known = found.axes_m2[0] * weight
     matrix = np.full((plan.dim, plan.dim), np.nan)

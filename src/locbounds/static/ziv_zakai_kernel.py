@@ -3,7 +3,8 @@ r"""The extended Ziv-Zakai bound along one direction.
 For a unit vector a and any shift delta(h) with ``a . delta(h) = h``
 
     E[(a . e)^2] >= 1/2 int_0^inf h V[A(delta(h))] dh,
-    A(delta) = int [f(theta) + f(theta + delta)] P_min(theta, theta + delta) dtheta,       V[g](h) = max over x >= h of g(x)
+    A(delta) = int [f(theta) + f(theta + delta)] P_min(theta, theta + delta) dtheta,
+    V[g](h) = max over x >= h of g(x)
 
 (Bell et al. 1997). P_min is the least error probability with the prior probabilities f(theta) and f(theta + delta);
 where only that of equally likely places is known, ``2 min(f, f') P_el`` stands in for the integrand, which is smaller.
@@ -80,11 +81,11 @@ def confusion(
     pairs = law.pairs(here, there)
     starts = (np.cumsum(counts) - counts)[filled]
     one, two = support.log_density(here), support.log_density(there)
-    exact = isinstance(law, GaussianPairs) and not support.uniform and not equal
+    exact = not support.uniform and not equal
     total, odds = np.logaddexp(one, two), one - two
     smaller = 2 * np.exp(np.minimum(one, two))
     for k, scale in enumerate(scales):
-        if exact:
+        if isinstance(law, GaussianPairs) and exact:
             each = np.exp(total) * gaussian_error(law.distance(pairs, scale), odds)
         else:
             each = smaller * law.error(pairs, scale)
@@ -98,12 +99,11 @@ def along(
 ) -> Along:  # fmt: skip
     """The bound on the mean square error along a unit vector, for several noise levels."""
     if free and len(scales) > 1:
-        each = [
-            along(support, law, a, n, [s], free=True, valley=valley, equal=equal, rtol=rtol) for s in scales
-        ]
+        each = [along(support, law, a, n, [s], free=True, valley=valley, equal=equal, rtol=rtol) for s in scales]
         h = np.unique(np.concatenate([e.h_m for e in each]))
         filled = np.array([np.interp(h, e.h_m, e.filled[0]) for e in each])
-        return Along(*(np.concatenate([getattr(e, f) for e in each]) for f in ("mse_m2", "error_m2")), h, filled)
+        mse, error = (np.concatenate([e[k] for e in each]) for k in (0, 1))
+        return Along(mse, error, h, filled)
 
     longest = _width(support, a) if free else support.reach(a)
     edges = longest * np.concatenate([[0.0], 0.5 ** np.arange(HALVINGS, -1, -1)])
@@ -185,9 +185,7 @@ def _width(support: Support, a: ndarray) -> float:
     if support.whole:
         return longest * np.sqrt(float(a @ support.covariance @ a) * float(a @ np.linalg.solve(support.covariance, a)))
     angles = np.linspace(-1, 1, 181)[1:-1] * np.pi / 2
-    return max(
-        longest, *(support.reach(np.cos(t) * a + np.sin(t) * b) * np.cos(t) for b in basis for t in angles)
-    )
+    return max(longest, *(support.reach(np.cos(t) * a + np.sin(t) * b) * np.cos(t) for b in basis for t in angles))
 
 
 def _free_offsets(

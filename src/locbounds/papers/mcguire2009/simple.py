@@ -1,7 +1,7 @@
 """Figs. 3 to 6: a node anywhere in a disc, three stations on a circle around its centre.
 
-The chapter draws one case per figure (ToA with stations at 15 m, ToA at 5 m, RSS at 5 m, AoA at 5 m); here every figure has a
-second one (TDoA, or the other radius), and TDoA's covariance is F C F^T. Angles of the stations are not printed.
+The chapter draws one case per figure (ToA with stations at 15 m, ToA at 5 m, RSS at 5 m, AoA at 5 m); here every figure
+has a second one (TDoA, or the other radius), and TDoA's covariance is F C F^T. Angles of the stations are not printed.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Case(NamedTuple):
     def plan(self, sigma: float = 1.0, *, turned_deg: float = 0.0) -> Plan:
         """The plan at a noise level, the stations turned."""
         stations = anchors(self.radius_m, turned_deg)
-        prior = UniformDisc([0.0, 0.0], AREA_M)
+        prior = disc()
         if self.kind == "RSS":
             return rss(stations, sigma, exponent=EXPONENT, prior=prior, title=self.name)
         make = {"ToA": toa, "TDoA": tdoa, "AoA": aoa}[self.kind]
@@ -106,6 +106,11 @@ class Row(NamedTuple):
     valid: str
 
 
+def disc() -> UniformDisc:
+    """Where the node is."""
+    return UniformDisc([0.0, 0.0], AREA_M)  # pyright: ignore[reportCallIssue]
+
+
 def anchors(radius_m: float, turned_deg: float = 0.0) -> Float[ndarray, "3 2"]:
     """Stations at 90, 210 and 330 degrees.
 
@@ -119,14 +124,14 @@ def anchors(radius_m: float, turned_deg: float = 0.0) -> Float[ndarray, "3 2"]:
 def expected_crlb(case: Case) -> tuple[float, float]:
     """Root of the mean over the disc of the local Cramér-Rao bound at sigma = 1, and its quadrature error.
 
-    Infinite for time differences with stations inside the disc: on the extension of a baseline two directions agree, and
-    the bound grows with the inverse square of the distance from it.
+    Infinite for time differences with stations inside the disc: on the extension of a baseline two directions agree,
+    and the bound grows with the inverse square of the distance from it.
     """
     if case.kind == "TDoA" and case.radius_m < AREA_M:
         return np.inf, 0.0
     found = []
     for n in CRLB_NODES:
-        points, weights = UniformDisc([0.0, 0.0], AREA_M).nodes(n)
+        points, weights = disc().nodes(n)
         J = np.asarray(_unit_plan(case).information(points)) * STEPS**2
         found.append(np.sqrt(weights @ np.trace(np.linalg.inv(J), axis1=1, axis2=2)))
     return float(found[1]), float(abs(found[1] - found[0]))
@@ -139,7 +144,7 @@ def inverse_expected_information(case: Case) -> float:
     """
     if case.kind in ("RSS", "AoA"):
         return 0.0
-    points, weights = UniformDisc([0.0, 0.0], AREA_M).nodes(CRLB_NODES[1])
+    points, weights = disc().nodes(CRLB_NODES[1])
     J = np.einsum("n,nab->ab", weights, np.asarray(_unit_plan(case).information(points))) * STEPS**2
     return float(np.sqrt(np.trace(np.linalg.inv(J))))
 
@@ -245,5 +250,7 @@ def simple_figure(rows: Iterable[Row]) -> Figure:
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("position RMSE in m")
     handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False, fontsize="small")
+    figure.legend(
+        handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False, fontsize="small"
+    )
     return figure

@@ -92,6 +92,6 @@ def _low_noise(case: dict[str, dict[float, float]]) -> Statement:
     return Statement(
         "Fig. 3: the Weiss-Weinstein bound is good at low noise and becomes loose at high noise",
         HOLDS if share[first] > 0.85 and share[worst] < share[first] else PARTLY,
-        f"as printed {share[first]:.0%} of the least error at {first:g} m and {share[worst]:.0%} at {worst:g} m; much of that "
-        f"is the form: with the support it is up to {better:.0%} larger",
+        f"as printed {share[first]:.0%} of the least error at {first:g} m and {share[worst]:.0%} at {worst:g} m; much "
+        f"of that is the form: with the support it is up to {better:.0%} larger",
     )

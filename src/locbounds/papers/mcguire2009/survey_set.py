@@ -1,8 +1,8 @@
 """Fig. 9: what a survey of received signal strengths tells.
 
 The chapter's own survey (117 seats of a lecture hall, 12 access points) was not published; the same computation runs
-here on measured surveys. The formula that the chapter gives for it is not a lower bound (docs/theory/survey.md), so that
-it stands beside the rigorous one, marked.
+here on measured surveys. The formula that the chapter gives for it is not a lower bound (docs/theory/survey.md), so
+that it stands beside the rigorous one, marked.
 """
 
 from __future__ import annotations
