@@ -63,9 +63,7 @@ def weiss_weinstein_from_densities(joint, shifts, exponent, step, dz):
         return out
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        psi = [
-            np.where(there, (moved(k) / f) ** exponent - (moved(-k) / f) ** (1 - exponent), 0.0) for k in shifts
-        ]
+        psi = [np.where(there, (moved(k) / f) ** exponent - (moved(-k) / f) ** (1 - exponent), 0.0) for k in shifts]
         mu = [np.sum(np.where(there, (moved(k) / f) ** exponent * f, 0.0)) * step * dz for k in shifts]
     G = np.array([[np.sum(p * q * f) * step * dz / (m * n) for q, n in zip(psi, mu, strict=True)]
                   for p, m in zip(psi, mu, strict=True)])  # fmt: skip

@@ -118,4 +118,6 @@ def test_valley_filling_helps_with_a_periodic_measurement():
     kept = lb.ezzb(plan, valley_filling=False)
     filled = lb.ezzb(plan)
     least = lb.mmse(plan, rtol=5e-3)
-    assert 1.3 * kept.position_mse[0] < filled.position_mse[0] < least.position_mse[0] * (1 + 8 * least.relative_stderr())
+    assert (
+        1.3 * kept.position_mse[0] < filled.position_mse[0] < least.position_mse[0] * (1 + 8 * least.relative_stderr())
+    )
