@@ -35,6 +35,8 @@ class PlanMap(NamedTuple):
         Uniform law of the plane over the area of the map.
     height_m : float or None
         In 3-D: height of the map.
+    heights_m : tuple of float or None
+        In 3-D: lowest and highest position of the device, if the file gives them.
     names, positions
         Of the anchors; positions [anchors, space] in metres.
     left_out : tuple of str
@@ -46,6 +48,7 @@ class PlanMap(NamedTuple):
     plan: Plan
     area: PositionPrior
     height_m: float | None
+    heights_m: tuple[float, float] | None
     names: tuple[str, ...]
     positions: np.ndarray
     left_out: tuple[str, ...] = ()
@@ -195,6 +198,7 @@ def _build(file: PlanFile, folder: Path) -> PlanMap:
         raise InputError("anchors have 2 and 3 coordinates", "Use the same number of coordinates everywhere")
     dim = dims.pop()
     area, height, prior = _area(file.area, dim)
+    heights = (float(prior.low), float(prior.high)) if isinstance(prior, Prism) else None
     if file.prior is not None:
         with at("prior"):
             prior = _prior(file.prior, dim)
@@ -206,7 +210,7 @@ def _build(file: PlanFile, folder: Path) -> PlanMap:
             f"{few}: there are {plan.size} measured numbers of {len(positions) - len(left_out)} anchors",
             "Add anchors or measurements" + (", or give NLOS links a noise (nlos)" if left_out else ""),
         )
-    return PlanMap(plan, area, height, tuple(positions), np.array(list(positions.values())), left_out, notes)
+    return PlanMap(plan, area, height, heights, tuple(positions), np.array(list(positions.values())), left_out, notes)
 
 
 def _region(shape: Shape, path: str) -> PositionPrior:

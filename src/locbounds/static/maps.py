@@ -1,38 +1,25 @@
-"""What accuracy is possible over an area: the bound at the points of a grid, and Bayesian numbers over the prior.
-
-Three kinds of numbers, which answer different questions:
-
-- *at a point* (``crlb``): what is possible for a device that is there, for estimators without prior knowledge;
-- *over the prior* (``bcrb``, ``wwb``, ``ezzb``, ``mmse``): the least mean square error on average over the prior;
-- *per cell*: the same for a device that is known to be in one cell of the area, uniformly.
-"""
+"""What accuracy is possible over an area: the Cramér-Rao bound at the points of a grid."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from locbounds.axes import Float, ndarray
-from locbounds.errors import InputError, LocboundsError, RefusedError
+from locbounds.errors import InputError
 from locbounds.plan import Plan
-from locbounds.priors import PositionPrior, PriorMixture, Prism, UniformBox, UniformPolygon
-from locbounds.registry import load, method
-from locbounds.result import Result
+from locbounds.priors import PositionPrior
 from locbounds.static import merit
 from locbounds.static.crlb import REASONS, PointBounds, crlb
-from locbounds.verdict import Status
+from locbounds.static.dop import dop
 
 if TYPE_CHECKING:
     import xarray
 
-AT_POINTS = ("crlb",)
-OVER_PRIOR = ("bcrb", "wwb", "ezzb", "mmse")  # ids whose function takes a plan with a prior and rtol
 OUTSIDE = -1
 MOST_POINTS = 4_000_000
-RTOL = 5e-3
 
 
 class AccuracyMap:
@@ -51,6 +38,16 @@ class AccuracyMap:
         At the points inside, row by row.
     share : float
         Of the error quantile, besides the median (CEP).
+    weights : array or None
+        For dilutions of precision of stations that differ, as in :func:`locbounds.dop`.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> square = [[0, 0], [100, 0], [100, 100], [0, 100]]
+    >>> found = lb.AccuracyMap(lb.toa(square, 2.0), lb.UniformBox([0, 0], [100, 100]), grid=5)
+    >>> found.figures["crlb_rmse_m"].shape, found.notes
+    ((25,), ('4 of 25 points without a bound: no derivative here: at an anchor, or where an angle is not defined',))
     """
 
     def __init__(
@@ -61,10 +58,15 @@ class AccuracyMap:
         grid: int = 101,
         height_m: float | None = None,
         share: float = 0.67,
+        weights: ndarray | None = None,
     ):
+        if plan.dim == 3 and height_m is None:
+            raise InputError("the plan has three coordinates, the map no height", "Give height_m in metres")
         self.plan, self.height_m, self.share = plan, height_m, merit.check_share(share)
         self.x_m, self.y_m, self.inside = grid_of(area, grid)
+        self.weights = weights
         self.bounds: PointBounds = crlb(plan, self.points)
+        self._dop = None if weights is None else dop(plan, self.points, weights=weights)
 
     @property
     def points(self) -> Float[ndarray, "points space"]:
@@ -93,8 +95,9 @@ class AccuracyMap:
             out["ellipse95_angle_rad"] = ellipse.angle_rad
         if b.clock_variance is not None:
             out["crlb_clock_m"] = np.sqrt(b.clock_variance)
-        if b.station_std is not None:
-            out |= {name: value for name, value in b.dop()._asdict().items() if value is not None}
+        dilutions = self._dop or (None if b.station_std is None else b.dop())
+        if dilutions is not None:
+            out |= {name: value for name, value in dilutions._asdict().items() if value is not None}
         return {name: np.asarray(value) for name, value in out.items()}
 
     def on_grid(self, values: ndarray) -> ndarray:
@@ -129,9 +132,9 @@ class AccuracyMap:
             n = int(np.sum(status == code))
             if n:
                 out.append(f"{n} of {len(status)} points without a bound: {REASONS[code]}")
-        if self.bounds.station_std is None:
+        if self.bounds.station_std is None and self.weights is None:
             why = "different units" if len(set(self.plan.units)) > 1 else "different deviations"
-            out.append(f"no dilution of precision: the stations have {why} (lb.dop takes weights)")
+            out.append(f"no dilution of precision: the stations have {why}, and no weights are given")
         return tuple(out)
 
     def to_dataset(self) -> xarray.Dataset:
@@ -204,142 +207,3 @@ def grid_of(area: PositionPrior, n: int) -> tuple[ndarray, ndarray, ndarray]:
     if not inside.any():
         raise InputError("no point of the grid is in the area", "Take a finer grid (--grid), or a larger area")
     return x, y, inside
-
-
-class Refusal:
-    """Why a method has no number."""
-
-    def __init__(self, id: str, why: str):
-        self.id, self.why = id, why
-
-
-def over_prior(plan: Plan, ids: Sequence[str], *, rtol: float = RTOL) -> dict[str, Result | Refusal]:
-    """Bayesian numbers of a plan, by id: a result, or why there is none.
-
-    Examples
-    --------
-    >>> import locbounds as lb
-    >>> plan = lb.toa([[0, 15], [-13, -7], [13, -7]], 2.0, prior=lb.UniformDisc([0, 0], 15))
-    >>> found = over_prior(plan, ["bcrb", "ezzb"])
-    >>> found["bcrb"].why[:34], round(float(found["ezzb"].position_rmse[0]), 2)
-    ('the density of a uniform law jumps', 2.22)
-    """
-    out: dict[str, Result | Refusal] = {}
-    for id in ids:
-        entry = method(id)
-        verdict = entry.verdict(plan)
-        if verdict.status is Status.REFUSED:
-            out[id] = Refusal(id, "; ".join(verdict.reasons))
-            continue
-        try:
-            out[id] = load(entry)(plan, rtol=rtol)
-        except (RefusedError, InputError) as error:
-            out[id] = Refusal(id, error.cause)
-    return out
-
-
-def cells_of(area: PositionPrior, n: int, height: tuple[float, float] | None = None) -> list[tuple[Any, PositionPrior]]:
-    """The area cut into squares, n along the longer side: corners [2, 2] of each and the uniform law on its part.
-
-    Examples
-    --------
-    >>> from locbounds.priors import UniformDisc
-    >>> len(cells_of(UniformDisc([0.0, 0.0], 10.0), 4))
-    16
-    """
-    import shapely
-
-    low, high = (np.asarray(corner)[:2] for corner in area.bounds())
-    side = float((high - low).max()) / n
-    counts = np.maximum(1, np.ceil((high - low) / side - 1e-9).astype(int))
-    whole = _outline(area)
-    out = []
-    for j in range(counts[1]):
-        for i in range(counts[0]):
-            a = low + side * np.array([i, j])
-            b = np.minimum(a + side, high)
-            part = whole.intersection(shapely.box(*a, *b))
-            law = _law(part, least=1e-3 * side**2)
-            if law is not None:
-                out.append((np.stack([a, b]), law if height is None else Prism(law, *height)))
-    return out
-
-
-def _outline(area: PositionPrior) -> Any:
-    import shapely
-
-    if isinstance(area, UniformBox):
-        return shapely.box(*area.low[:2], *area.high[:2])
-    if isinstance(area, UniformPolygon):
-        return area.shape
-    return shapely.Point(*area.center).buffer(float(area.radius), quad_segs=32)  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def _law(part: Any, least: float) -> PositionPrior | None:
-    """The uniform law on a Shapely region; None if it is too small to speak of."""
-    pieces = [g for g in getattr(part, "geoms", [part]) if g.geom_type == "Polygon" and g.area > least]
-    laws: list[PositionPrior] = []
-    for g in pieces:
-        corners = np.asarray(g.exterior.coords)[:-1]
-        low, high = corners.min(0), corners.max(0)
-        box = not g.interiors and abs(g.area - np.prod(high - low)) < 1e-9 * g.area
-        laws.append(
-            UniformBox(low, high) if box else UniformPolygon(corners, [np.asarray(r.coords) for r in g.interiors])
-        )
-    if len(laws) < 2:
-        return laws[0] if laws else None
-    sizes = np.array([g.area for g in pieces])
-    return PriorMixture(sizes / sizes.sum(), laws)
-
-
-class Cell:
-    """A cell of the area: its corners [2, 2] in metres, and the numbers of each method there."""
-
-    def __init__(self, corners: ndarray, found: dict[str, Result | Refusal]):
-        self.corners, self.found = corners, found
-
-    def rmse(self, id: str) -> tuple[float, float]:
-        """RMSE and standard error in metres; NaN where a method has no number, which its refusal explains."""
-        r = self.found.get(id)
-        if not isinstance(r, Result):
-            return float("nan"), float("nan")
-        return float(r.position_rmse[0]), float(r.position_rmse_stderr[0])
-
-
-def per_cell(
-    plan: Plan,
-    area: PositionPrior,
-    ids: Sequence[str],
-    *,
-    cells: int,
-    height: tuple[float, float] | None = None,
-    rtol: float = 2 * RTOL,
-    progress: Callable[[int, int], None] = lambda done, total: None,
-) -> list[Cell]:
-    """Bayesian numbers for a device that is known to be in one cell of the area, for every cell.
-
-    Parameters
-    ----------
-    plan
-        Its prior is replaced.
-    area
-        Of the map.
-    ids
-        Methods, of :data:`OVER_PRIOR`.
-    cells
-        Cells along the longer side.
-    height
-        In 3-D: lowest and highest position.
-    progress
-        Called with (cells done, cells).
-    """
-    parts = cells_of(area, cells, height)
-    out = []
-    for k, (corners, law) in enumerate(parts):
-        try:
-            found = over_prior(plan.replace(prior=law), ids, rtol=rtol)
-        except LocboundsError as error:
-            found = {id: Refusal(id, error.cause) for id in ids}
-        out.append(Cell(corners, found))
-        progress(k + 1, len(parts))
-    return out
