@@ -14,7 +14,7 @@ def grid(inside, low, high, step):
 def weiss_weinstein(points, step, inside, means, H):
     """WWB matrix of a uniform prior and unit Gaussian noise, all expectations over the same cells."""
     area = len(points) * step ** points.shape[1]
-    tests = [h for h in H.T]
+    tests = list(H.T)
 
     def root(u):
         return inside(points + u) / np.sqrt(area)
@@ -63,9 +63,7 @@ def weiss_weinstein_from_densities(joint, shifts, exponent, step, dz):
         return out
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        psi = [
-            np.where(there, (moved(k) / f) ** exponent - (moved(-k) / f) ** (1 - exponent), 0.0) for k in shifts
-        ]
+        psi = [np.where(there, (moved(k) / f) ** exponent - (moved(-k) / f) ** (1 - exponent), 0.0) for k in shifts]
         mu = [np.sum(np.where(there, (moved(k) / f) ** exponent * f, 0.0)) * step * dz for k in shifts]
     G = np.array([[np.sum(p * q * f) * step * dz / (m * n) for q, n in zip(psi, mu, strict=True)]
                   for p, m in zip(psi, mu, strict=True)])  # fmt: skip

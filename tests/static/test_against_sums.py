@@ -1,12 +1,12 @@
 """Bounds against their definitions, summed over grids by code that shares nothing with them."""
 
-import static_by_hand as by_hand
 import numpy as np
 import pytest
 import shapely
 from scipy.special import logsumexp
 
 import locbounds as lb
+import static_by_hand as by_hand
 from locbounds.static import support as supports
 from locbounds.static.pair_laws import GaussianPairs, wrapped_log_affinity
 from locbounds.static.plan_laws import pair_law, support_of
@@ -118,4 +118,6 @@ def test_valley_filling_helps_with_a_periodic_measurement():
     kept = lb.ezzb(plan, valley_filling=False)
     filled = lb.ezzb(plan)
     least = lb.mmse(plan, rtol=5e-3)
-    assert 1.3 * kept.position_mse[0] < filled.position_mse[0] < least.position_mse[0] * (1 + 8 * least.relative_stderr())
+    assert (
+        1.3 * kept.position_mse[0] < filled.position_mse[0] < least.position_mse[0] * (1 + 8 * least.relative_stderr())
+    )

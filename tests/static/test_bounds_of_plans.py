@@ -1,10 +1,10 @@
 """Bounds and estimators of plans: order, verdicts, searches, invariances."""
 
-import static_by_hand as by_hand
 import numpy as np
 import pytest
 
 import locbounds as lb
+import static_by_hand as by_hand
 from locbounds.papers.mcguire2009 import CASES
 from locbounds.registry import METHODS, method
 from locbounds.static.barankin import barankin_matrix
@@ -16,7 +16,9 @@ NEAR = lb.GaussianPrior([1.0, 2.0], np.array([[16.0, 5.0], [5.0, 9.0]]))
 YARD = lb.UniformPolygon(
     [[-9, -9], [9, -9], [9, 9], [0, 9], [0, 0], [-9, 0]], holes=[[[3, -6], [6, -6], [6, -3], [3, -3]]]
 )
-ROOMS = lb.PriorMixture([0.3, 0.7], [lb.GaussianPrior([-6.0, 0.0], 2 * np.eye(2)), lb.GaussianPrior([5.0, 1.0], np.eye(2))])
+ROOMS = lb.PriorMixture(
+    [0.3, 0.7], [lb.GaussianPrior([-6.0, 0.0], 2 * np.eye(2)), lb.GaussianPrior([5.0, 1.0], np.eye(2))]
+)
 RTOL = 2e-3
 SEARCHED = 1e-6  # maxima are flat: rounding moves where they are found
 
@@ -50,8 +52,7 @@ def test_no_valid_bound_is_above_the_least_error(name):
 def test_more_tests_are_tighter_and_the_printed_form_is_looser():
     plan = lb.toa(ANCHORS, 12.0, prior=DISC)
     printed, equal, diagonal, many = (
-        rmse(lb.wwb(plan, **options))
-        for options in ({"form": "printed"}, {}, {"tests": "diagonal"}, {"tests": 8})
+        rmse(lb.wwb(plan, **options)) for options in ({"form": "printed"}, {}, {"tests": "diagonal"}, {"tests": 8})
     )
     assert printed < 0.8 * equal
     assert equal <= diagonal * (1 + 1e-6)

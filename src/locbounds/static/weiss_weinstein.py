@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -20,10 +21,10 @@ from locbounds.static.support import Support
 
 NODES, MOST_NODES = 6, 160  # along a side
 FEW = 8  # while the scale of many test points is searched
-GRID = 25  # lengths swept at first
-DECADES = 3.0  # over which they reach down from the longest
-ZOOMS = 3  # times that a parabola is laid through the largest local maxima
+FIRST = np.concatenate([np.geomspace(1e-3, 0.1, 10), np.linspace(0.15, 0.99, 13)])  # lengths, relative to the longest
+ZOOMS = 2  # times that a parabola is laid through the largest local maxima
 PEAKS = 3  # of them at first, then the largest only
+NEARLY = 0.9  # of the largest value so far: what a lower maximum must have to be looked at
 LENGTHS = (1.0, 1.7, 2.9, 4.9)  # of many test points, relative to the shortest
 TOO_SHORT = 1.6  # a grid that misses the maximum grows by this factor
 
@@ -79,30 +80,34 @@ def equal_lengths(
     grams = kernel.grams if form == "support" else kernel.printed
     longest = _longest(support, pattern)
 
-    def values(h: ndarray, nodes: int = n) -> ndarray:
+    coarse = max(3, 2 * n // 3)  # to search on
+
+    def values(h: ndarray, nodes: int = coarse) -> ndarray:
         found = grams(support, law, [k * pattern for k in h], nodes, scales)
         each = [kernel.bound_matrices(k * pattern, gram) for k, gram in zip(h, found, strict=True)]
         return np.trace(np.stack(each, 1), axis1=2, axis2=3)
 
-    h = longest * np.logspace(-DECADES, 0, GRID + 1)[:-1] if lengths is None else np.unique(np.asarray(lengths, float))
+    h = longest * FIRST if lengths is None else _without_gaps(np.asarray(lengths, float))
     mse = values(h)
     for _ in range(60):
         more = _beyond(h, mse, longest, support)
         if not len(more):
             break
         h, mse = _merge(h, mse, more, values(more))
-    for zoom in range(ZOOMS):
+    for zoom in range(ZOOMS if len(scales) > 1 else 2 * ZOOMS):
         closer = np.unique(np.concatenate([_closer(h, row, zoom) for row in mse]))
         closer = closer[~np.isin(closer, h)]
         if len(closer):
             h, mse = _merge(h, mse, closer, values(closer))
-    fresh, best = n + n // 2 + 1, []
     tops = h[mse.argmax(1)]
-    final = {k: grams(support, law, [k * pattern], fresh, scales)[0] for k in np.unique(tops)}
+    once = np.unique(tops)
+    each, finer = (grams(support, law, [k * pattern for k in once], m, scales) for m in (n, n + n // 2 + 1))
+    best = []
     for s, top in enumerate(tops):
-        matrix = kernel.bound_matrices(top * pattern, final[top])[s]
-        before = mse[s].max()
-        best.append(Best(matrix, top * pattern, float(abs(np.sqrt(np.trace(matrix) / max(before, 1e-300)) - 1))))
+        k = int(np.searchsorted(once, top))
+        before, matrix = (kernel.bound_matrices(top * pattern, found[k])[s] for found in (each, finer))
+        change = np.sqrt(np.trace(matrix) / max(np.trace(before), 1e-300)) - 1
+        best.append(Best(matrix, top * pattern, float(abs(change))))
     return best, Swept(h, mse)
 
 
@@ -129,6 +134,13 @@ def _beyond(h: ndarray, mse: ndarray, longest: float, support: Support) -> ndarr
     return np.unique(np.concatenate(more)) if more else np.zeros(0)
 
 
+def _without_gaps(lengths: ndarray) -> ndarray:
+    """Sorted lengths, with others between neighbours that are further than a factor of two apart."""
+    h = np.unique(lengths)
+    between = [np.geomspace(a, b, int(np.ceil(np.log2(b / a))) + 1) for a, b in itertools.pairwise(h) if b > 2 * a]
+    return np.unique(np.concatenate([h, *between]))
+
+
 def _merge(h: ndarray, mse: ndarray, more: ndarray, values: ndarray) -> tuple[ndarray, ndarray]:
     every = np.concatenate([h, more])
     order = np.argsort(every)
@@ -140,6 +152,7 @@ def _closer(h: ndarray, row: ndarray, zoom: int) -> ndarray:
     inner = np.flatnonzero((row >= np.r_[-np.inf, row[:-1]]) & (row >= np.r_[row[1:], -np.inf]))
     inner = inner[(inner > 0) & (inner < len(h) - 1)]
     peaks = inner[np.argsort(-row[inner])][: PEAKS if zoom == 0 else 1]
+    peaks = peaks[row[peaks] >= NEARLY * row.max()]
     found = []
     for k in peaks:
         x, y = np.log(h[k - 1 : k + 2]), row[k - 1 : k + 2]
@@ -374,7 +387,7 @@ def _any_exponent(
     swept, H = None, fixed
     if H is None:
         identity = np.eye(support.space)
-        h = _longest(support, identity) * np.logspace(-DECADES, 0, GRID + 1)[:-1]
+        h = _longest(support, identity) * FIRST
         mse = np.array([np.trace(trace(k * identity, NODES)) for k in h])
         for zoom in range(ZOOMS):
             closer = _closer(h, mse, zoom)
