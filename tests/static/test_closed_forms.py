@@ -6,8 +6,8 @@ import pytest
 from locbounds.static import support as supports
 from locbounds.static.overlap import Rule, legendre
 from locbounds.static.pair_laws import GaussianPairs, gaussian_error
-from locbounds.static.weiss_weinstein import equal_lengths
 from locbounds.static.weiss_weinstein_kernel import bound_matrices, grams, printed, with_exponent
+from locbounds.static.weiss_weinstein_search import equal_lengths
 from locbounds.static.ziv_zakai_kernel import along
 
 EXACT = 1e-6

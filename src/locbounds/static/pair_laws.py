@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,23 @@ FINE = np.linspace(0.0, 0.5, 2**14 + 1)  # differences between which the coeffic
 TABLE = 513  # differences at which the coefficient of a wrapped normal law is tabulated
 WAVES = 0.3  # deviation over period above which a wrapped density is a short Fourier series
 NARROW = 0.02  # deviation over period below which no table is needed
+
+
+@runtime_checkable
+class PairLaw(Protocol):
+    """What a bound asks of a measurement law."""
+
+    def pairs(self, a: Float[ndarray, "n space"], b: Float[ndarray, "n space"]) -> ndarray:
+        """Statistics of pairs of places, first axis the pairs."""
+        ...
+
+    def log_affinity(self, pairs: ndarray, scale: float) -> Float[ndarray, " n"]:
+        """Logarithm of the Bhattacharyya coefficient."""
+        ...
+
+    def error(self, pairs: ndarray, scale: float) -> Float[ndarray, " n"]:
+        """Least error probability between equally likely places, or a lower bound on it."""
+        ...
 
 
 def gaussian_error(distance: ndarray, log_odds: ndarray) -> ndarray:
@@ -122,10 +139,6 @@ class Tabulated(NamedTuple):
 
     def error(self, pairs: ndarray, scale: float) -> ndarray:
         return self.minimum_error(pairs[:, 0], pairs[:, 1])
-
-
-PairLaw = GaussianPairs | Tabulated
-"""What a bound asks of a measurement law: ``pairs``, ``log_affinity`` and ``error``."""
 
 
 def wrapped_log_affinity(difference: ndarray, std: float, period: float = 2 * np.pi) -> ndarray:
