@@ -14,7 +14,7 @@ def grid(inside, low, high, step):
 def weiss_weinstein(points, step, inside, means, H):
     """WWB matrix of a uniform prior and unit Gaussian noise, all expectations over the same cells."""
     area = len(points) * step ** points.shape[1]
-    tests = [h for h in H.T]
+    tests = list(H.T)
 
     def root(u):
         return inside(points + u) / np.sqrt(area)

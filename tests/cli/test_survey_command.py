@@ -90,10 +90,10 @@ def test_bad_surveys_end_with_cause_remedy_and_no_files(tmp_path, change, option
 
 def test_the_paper_needs_its_data(monkeypatch, tmp_path):
     monkeypatch.delenv("LOCBOUNDS_DATA", raising=False)
-    done = run("paper", "mcguire2009")
+    done = run("paper", "mcguire2009", "--figures", "fig9")
     assert done.exit_code == 2
     assert "--data" in done.stderr
-    done = run("paper", "mcguire2009", "--data", tmp_path)
+    done = run("paper", "mcguire2009", "--figures", "fig9", "--data", tmp_path)
     assert done.exit_code == 2
     assert "wut_wifi_117" in done.stderr
 
@@ -102,7 +102,7 @@ def test_the_paper_needs_its_data(monkeypatch, tmp_path):
 def test_fig9_on_all_surveys(tmp_path):
     for name in ("wut_wifi_117", "wifi_rtt_grid", "wifine_train"):
         need(name)
-    done = run("paper", "mcguire2009", "--data", folder())
+    done = run("paper", "mcguire2009", "--figures", "fig9", "--data", folder())
     assert done.exit_code == 0, done.output
     rows = list(csv.DictReader((tmp_path / "mcguire2009-out" / "fig9.csv").read_text().splitlines()))
     sets = {row["set"] for row in rows} - {"published"}

@@ -1,12 +1,12 @@
 """Bounds against their definitions, summed over grids by code that shares nothing with them."""
 
-import static_by_hand as by_hand
 import numpy as np
 import pytest
 import shapely
 from scipy.special import logsumexp
 
 import locbounds as lb
+import static_by_hand as by_hand
 from locbounds.static import support as supports
 from locbounds.static.pair_laws import GaussianPairs, wrapped_log_affinity
 from locbounds.static.plan_laws import pair_law, support_of

@@ -1,10 +1,10 @@
 """Bounds and estimators of plans: order, verdicts, searches, invariances."""
 
-import static_by_hand as by_hand
 import numpy as np
 import pytest
 
 import locbounds as lb
+import static_by_hand as by_hand
 from locbounds.papers.mcguire2009 import CASES
 from locbounds.registry import METHODS, method
 from locbounds.static.barankin import barankin_matrix

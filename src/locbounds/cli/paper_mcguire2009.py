@@ -55,7 +55,7 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
     if found:
         typer.echo(
             "\nCRLB and BCRB are no bounds here: the prior ends at the rim, and estimators that know it are biased. "
-            "They are the mean\nof the local bound and the inverse of the mean information; of RSS and AoA it is zero.\n"
+            "They are the mean\nof the local bound and the inverse of the mean information; zero for RSS and AoA.\n"
         )
     if surveys:
         _print_fig9(surveys)

@@ -21,12 +21,14 @@ from locbounds.result import Result
 from locbounds.static.common import static_result, verdict_of
 from locbounds.static.pair_laws import GaussianPairs
 from locbounds.static.plan_laws import means, pair_law
-from locbounds.static.weiss_weinstein import fan
+from locbounds.static.weiss_weinstein_search import fan
 
 SHORT = 1e-3  # test vectors of the local part: so many deviations away
 LENGTHS = 0.5 * 1.6 ** np.arange(10)  # of the others, in deviations of the Cramér-Rao bound
 DIRECTIONS = 12
 RANK = 1e-10
+LARGE = 40.0  # exponents beyond which one does not count beside the exponential
+FARTHEST = 600.0  # squared distance of a test point that adds something: exp(-600)
 
 
 def barankin_matrix(
@@ -40,25 +42,17 @@ def barankin_matrix(
     >>> round(float(barankin_matrix(step, 2 * step.T)[0, 0]), 6)
     0.25
     """
-    square = np.square(v).sum(1)
-    B = (
-        np.exp(-0.5 * (square[:, None] + square)) * np.expm1(v @ v.T)
-        if np.max(square, initial=0) < 300
-        else _far(v, square)
-    )
+    square, inner = np.square(v).sum(1), v @ v.T
+    both = -0.5 * (square[:, None] + square)
+    B = np.where(inner < LARGE, np.exp(both) * np.expm1(np.minimum(inner, LARGE)), np.exp(both + inner))
     moved = H * np.exp(-0.5 * square)
     size = np.sqrt(np.maximum(np.diagonal(B), 0.0))
-    keep = (size > 0) & (square < 600)
+    keep = (size > 0) & (square < FARTHEST)
     B, moved = B[np.ix_(keep, keep)] / np.outer(size[keep], size[keep]), moved[:, keep] / size[keep]
     values, vectors = np.linalg.eigh(B)
     good = values > RANK * max(values.max(initial=0.0), 1e-300)
     parts = (moved @ vectors[:, good]) / np.sqrt(values[good])
     return parts @ parts.T
-
-
-def _far(v: ndarray, square: ndarray) -> ndarray:
-    both = -0.5 * (square[:, None] + square)
-    return np.exp(both + v @ v.T) - np.exp(both)
 
 
 @double_precision

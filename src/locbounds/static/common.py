@@ -41,6 +41,18 @@ def check_rtol(rtol: Any) -> float:
     return float(rtol)
 
 
+def not_refined(verdict: Verdict, change: float, rtol: float) -> Verdict:
+    """The verdict, with a warning where a quadrature has not reached its precision.
+
+    >>> not_refined(Verdict(Status.VALID, ()), 0.01, 1e-3).warnings
+    ('finer nodes changed the RMSE by 1.0%, more than the 0.1% asked for',)
+    """
+    if change <= rtol:
+        return verdict
+    text = f"finer nodes changed the RMSE by {change:.1%}, more than the {rtol:.1%} asked for"
+    return verdict._replace(warnings=(*verdict.warnings, text))
+
+
 def static_result(
     id: str,
     matrix: Float[ndarray, "space space"],

@@ -13,7 +13,7 @@ from locbounds.precision import double_precision
 from locbounds.result import Result
 from locbounds.static.common import static_result, verdict_of
 from locbounds.static.likelihood import Likelihood, likelihood
-from locbounds.static.mmse import REPLICATES, Drawn, _power, draw, nodes_of, over_replicates, posterior
+from locbounds.static.mmse import REPLICATES, Drawn, draw, nodes_of, over_replicates, posterior, power
 from locbounds.static.plan_laws import needs_prior
 
 DRAWS = 2048
@@ -53,7 +53,7 @@ def ml(plan: Plan, *, draws: int = DRAWS, seed: int = 0) -> Result:
     """
     prior = needs_prior(plan, "an average over positions")
     verdict, law = verdict_of("ml", plan), likelihood(plan)
-    drawn = draw(plan, law, _power(draws), REPLICATES, check_seed(seed))
+    drawn = draw(plan, law, power(draws), REPLICATES, check_seed(seed))
     nodes = nodes_of(plan, law, NODES)
     low, high = (np.asarray(x) for x in prior.bounds())
 
@@ -90,7 +90,7 @@ def ls(plan: Plan, *, draws: int = DRAWS, seed: int = 0) -> Result:
     """
     prior = needs_prior(plan, "an average over positions")
     verdict, law = verdict_of("ls", plan), likelihood(plan)
-    drawn = draw(plan, law, _power(draws), REPLICATES, check_seed(seed))
+    drawn = draw(plan, law, power(draws), REPLICATES, check_seed(seed))
     low, high = (np.asarray(x) for x in prior.bounds())
     middle, half = 0.5 * (low + high), 0.5 * WIDER * (high - low)
     t = np.linspace(-1, 1, 2 * NODES + 1 if plan.dim < 3 else 25)

@@ -17,7 +17,7 @@ from locbounds.errors import InputError
 from locbounds.plan import Plan
 from locbounds.precision import double_precision
 from locbounds.result import Result
-from locbounds.static.common import check_rtol, static_result, verdict_of
+from locbounds.static.common import check_rtol, not_refined, static_result, verdict_of
 from locbounds.static.draws import places, sobol
 from locbounds.static.likelihood import SMALL, Likelihood, likelihood
 from locbounds.static.plan_laws import needs_prior
@@ -246,7 +246,7 @@ def mmse(plan: Plan, *, rtol: float = 2e-3, draws: int | None = None, seed: int 
     verdict, rtol = verdict_of("mmse", plan), check_rtol(rtol)
     law, seed = likelihood(plan), check_seed(seed)
     nodes = None
-    change, runs = 0.0, RUNS if draws is None else _power(draws)
+    change, runs = 0.0, RUNS if draws is None else power(draws)
     while True:
         drawn = draw(plan, law, runs, REPLICATES, seed)
         if nodes is None:
@@ -257,8 +257,7 @@ def mmse(plan: Plan, *, rtol: float = 2e-3, draws: int | None = None, seed: int 
         runs = int(min(MOST_RUNS, 2 ** np.ceil(np.log2(runs * max(2.0, (found.relative_error / rtol) ** 2)))))
     if found.relative_error > rtol and draws is None:
         verdict = verdict._replace(warnings=(*verdict.warnings, f"relative standard error {found.relative_error:.1%}"))
-    if change > rtol:
-        verdict = verdict._replace(warnings=(*verdict.warnings, f"finer nodes changed the RMSE by {change:.1%}"))
+    verdict = not_refined(verdict, change, rtol)
     how = f"posterior variance over {len(nodes.points):,} places, {REPLICATES} scrambled Sobol sets"
     diagnostics = {"nodes": len(nodes.points), "draws": runs * REPLICATES, "quadrature_error": change}
     return static_result(
@@ -267,7 +266,12 @@ def mmse(plan: Plan, *, rtol: float = 2e-3, draws: int | None = None, seed: int 
     )  # fmt: skip
 
 
-def _power(draws: int) -> int:
+def power(draws: int) -> int:
+    """Draws of each replicate: the next power of two.
+
+    >>> power(1000)
+    64
+    """
     if draws < 2 * REPLICATES:
         raise InputError(f"{draws} draws", f"Give at least {2 * REPLICATES}")
     return int(2 ** np.ceil(np.log2(draws / REPLICATES)))

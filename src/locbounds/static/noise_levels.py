@@ -13,7 +13,8 @@ from locbounds.plan import Plan
 from locbounds.precision import double_precision
 from locbounds.static.pair_laws import GaussianPairs
 from locbounds.static.plan_laws import needs_prior, pair_law, support_of
-from locbounds.static.weiss_weinstein import MOST_NODES, NODES, Best, equal_lengths
+from locbounds.static.weiss_weinstein import MOST_NODES
+from locbounds.static.weiss_weinstein_search import NODES, Best, equal_lengths
 from locbounds.static.ziv_zakai import over_axes
 
 

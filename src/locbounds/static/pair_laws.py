@@ -8,15 +8,33 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from locbounds.axes import Float, ndarray
 
+FINE = np.linspace(0.0, 0.5, 2**14 + 1)  # differences between which the coefficient of a wrapped law is linear
 TABLE = 513  # differences at which the coefficient of a wrapped normal law is tabulated
 WAVES = 0.3  # deviation over period above which a wrapped density is a short Fourier series
 NARROW = 0.02  # deviation over period below which no table is needed
+
+
+@runtime_checkable
+class PairLaw(Protocol):
+    """What a bound asks of a measurement law."""
+
+    def pairs(self, a: Float[ndarray, "n space"], b: Float[ndarray, "n space"]) -> ndarray:
+        """Statistics of pairs of places, first axis the pairs."""
+        ...
+
+    def log_affinity(self, pairs: ndarray, scale: float) -> Float[ndarray, " n"]:
+        """Logarithm of the Bhattacharyya coefficient."""
+        ...
+
+    def error(self, pairs: ndarray, scale: float) -> Float[ndarray, " n"]:
+        """Least error probability between equally likely places, or a lower bound on it."""
+        ...
 
 
 def gaussian_error(distance: ndarray, log_odds: ndarray) -> ndarray:
@@ -75,13 +93,16 @@ class GaussianPairs(NamedTuple):
 
     def pairs(self, a: ndarray, b: ndarray) -> ndarray:
         """Squared Mahalanobis distance; with periodic channels also that of the others, and the wrapped differences."""
-        gap = self.means(b) - self.means(a)
+        both = self.means(np.concatenate([a, b]))
+        gap = np.ascontiguousarray((both[len(a) :] - both[: len(a)]).T)
         round_ = np.isfinite(self.period)
+        for k in np.flatnonzero(round_):
+            gap[k] -= self.period[k] * np.round(gap[k] / self.period[k])
+        white = self.whitener @ gap
+        white *= white
         if not round_.any():
-            return np.square(gap @ self.whitener.T).sum(-1, keepdims=True)
-        gap[:, round_] -= self.period[round_] * np.round(gap[:, round_] / self.period[round_])
-        white = np.square(gap @ self.whitener.T)
-        return np.column_stack([white.sum(-1), white[:, ~round_].sum(-1), gap[:, round_]])
+            return white.sum(0)[:, None]
+        return np.stack([white.sum(0), white[~round_].sum(0), *gap[round_]], axis=1)
 
     def log_affinity(self, pairs: ndarray, scale: float) -> ndarray:
         """Logarithm of the Bhattacharyya coefficient of pairs of places."""
@@ -120,10 +141,6 @@ class Tabulated(NamedTuple):
         return self.minimum_error(pairs[:, 0], pairs[:, 1])
 
 
-PairLaw = GaussianPairs | Tabulated
-"""What a bound asks of a measurement law: ``pairs``, ``log_affinity`` and ``error``."""
-
-
 def wrapped_log_affinity(difference: ndarray, std: float, period: float = 2 * np.pi) -> ndarray:
     """Logarithm of the Bhattacharyya coefficient of two wrapped normal laws.
 
@@ -147,12 +164,12 @@ def wrapped_log_affinity(difference: ndarray, std: float, period: float = 2 * np
     if std < NARROW * period:  # mass around the middles of both arcs between the centres, nothing elsewhere
         near, far = np.abs(difference), period - np.abs(difference)
         return np.logaddexp(-(near**2) / (8 * std**2), -(far**2) / (8 * std**2))
-    return _wrapped_table(std / period)(np.abs(difference) / period)
+    return np.interp(np.abs(difference), period * FINE, _wrapped_table(std / period))
 
 
 @functools.lru_cache(maxsize=128)
-def _wrapped_table(std: float) -> Callable[[ndarray], ndarray]:
-    """The coefficient for a period of one."""
+def _wrapped_table(std: float) -> ndarray:
+    """The coefficient for a period of one, at :data:`FINE`."""
     from scipy.interpolate import CubicSpline
     from scipy.special import logsumexp
 
@@ -167,4 +184,4 @@ def _wrapped_table(std: float) -> Callable[[ndarray], ndarray]:
         return logsumexp(-0.5 * ((at[..., None] + copies) / std) ** 2, axis=-1) - np.log(std * np.sqrt(2 * np.pi))
 
     total = 0.5 * (log_density(x) + log_density(x - grid[:, None]))
-    return CubicSpline(grid, logsumexp(total, axis=1) - np.log(512))
+    return CubicSpline(grid, logsumexp(total, axis=1) - np.log(512))(FINE)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from locbounds.axes import Array, Float, ndarray
@@ -13,7 +15,7 @@ from locbounds.static.overlap import polygon_overlap, shared_nodes
 from locbounds.static.pair_laws import GaussianPairs, PairLaw, Tabulated
 from locbounds.static.support import REACH, Support
 
-BLOCKS = (4096, 65_536)  # places evaluated at once: two compilations per plan
+BLOCKS = (4096, 32_768)  # places evaluated at once: two compilations per plan
 
 
 def means(plan: Plan, points: Float[ndarray, "n space"]) -> Float[ndarray, "n channels"]:
@@ -112,6 +114,7 @@ def support_of(prior: PositionPrior, marks: Array | None = None) -> Support:
     def log_density(points: ndarray) -> ndarray:
         return np.asarray(prior.log_density(points))
 
+    @functools.cache
     def nodes(n: int) -> tuple[ndarray, ndarray]:
         points, weights = prior.nodes(n)
         return np.asarray(points), np.asarray(weights)

@@ -13,7 +13,7 @@ from locbounds.plan import Plan
 from locbounds.precision import double_precision
 from locbounds.result import Result
 from locbounds.static import ziv_zakai_kernel as kernel
-from locbounds.static.common import check_rtol, static_result, verdict_of
+from locbounds.static.common import check_rtol, not_refined, static_result, verdict_of
 from locbounds.static.pair_laws import GaussianPairs, PairLaw
 from locbounds.static.plan_laws import needs_prior, pair_law, support_of
 from locbounds.static.support import Support
@@ -137,6 +137,7 @@ def ezzb(
         equal=probabilities == "equal",
         rtol=rtol,
     )
+    verdict = not_refined(verdict, float(found.error[0]), rtol)
     known = found.axes_m2[0] * weight
     matrix = np.full((plan.dim, plan.dim), np.nan)
     if direction is None:
