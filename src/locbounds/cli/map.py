@@ -127,6 +127,9 @@ def map_plan(
             picture = map_plot.draw_cells(read.plan, read.area, parts, local, anchors=read.positions)
             folder.write("cells.png", lambda target: picture.savefig(target, dpi=150))
     best = bayes.choose(numbers)
+    notes += [
+        f"warning: {id}: {w}" for id, r in numbers.items() for w in getattr(getattr(r, "verdict", None), "warnings", ())
+    ]
     if json:
         _print_json(read, found, rows, best, parts, local, notes)
         return

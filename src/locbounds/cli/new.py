@@ -28,7 +28,9 @@ Rare wide errors in both conditions:
 
 def new(
     path: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="File to write.", show_default=False)],
-    like: Annotated[str, typer.Option("--like", metavar="PAPER", help="Paper to start from; plan: a plan for locbounds map.")] = "fritsche2013",
+    like: Annotated[
+        str, typer.Option("--like", metavar="PAPER", help="Paper to start from; plan: a plan for locbounds map.")
+    ] = "fritsche2013",
     motion: Annotated[
         str, typer.Option("--motion", metavar="MODEL", help="constant-velocity, random-walk or constant-acceleration.")
     ] = "constant-velocity",

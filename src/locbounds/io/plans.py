@@ -93,7 +93,7 @@ def read_text(text: str, *, folder: str | os.PathLike = ".", source: str = "plan
     r"""A plan from the text of a plan file; as :func:`read_plan`.
 
     >>> try:
-    ...     read_text('format = 1\n[area]\nlow_m = [0, 0]\nhigh_m = [9, 9]\n[links]\nmeasure = "rss"\nlos = { std_m = 4 }')
+    ...     read_text('format = 1\n[area]\ncenter_m = [0, 0]\nradius_m = 9\n[links]\nmeasure = "rss"\nlos.std_m = 4')
     ... except InputError as error:
     ...     print(error.cause, error.remedy, sep="\n")
     plan: unknown key links.los.std_m = 4
@@ -210,7 +210,8 @@ def _build(file: PlanFile, folder: Path) -> PlanMap:
             f"{few}: there are {plan.size} measured numbers of {len(positions) - len(left_out)} anchors",
             "Add anchors or measurements" + (", or give NLOS links a noise (nlos)" if left_out else ""),
         )
-    return PlanMap(plan, area, height, heights, tuple(positions), np.array(list(positions.values())), left_out, notes)
+    places = np.array(list(positions.values()))
+    return PlanMap(plan, area, height, heights, tuple(positions), places, left_out, notes)
 
 
 def _region(shape: Shape, path: str) -> PositionPrior:

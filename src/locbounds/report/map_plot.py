@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TOP = 0.98  # quantile of the values at the top of a colour bar, so that a few bad places do not hide the rest
+LOGARITHMIC = 8.0  # a wider range of values has logarithmic colours
 ELLIPSES = 9  # along the longer side
 SIDE_IN = 4.6  # inches of a panel's longer side
 NO_BOUND = "#D62728"
@@ -57,7 +58,11 @@ def draw_map(found: AccuracyMap, area: Any, *, names: Sequence[str] = (), anchor
         ("Median error of that accuracy", f"{spherical} in m", f["crlb_cep_m"]),
         ("Dilution of precision", "GDOP", f["gdop"])
         if "gdop" in f
-        else (f"{found.share:.0%} of the errors are below", f"{found.share:.0%} quantile in m", f[quantile]),
+        else (
+            f"{100 * found.share:g} % of the errors are below",
+            f"{100 * found.share:g} % quantile in m",
+            f[quantile],
+        ),
     ]
     anchors = np.asarray(found.plan.anchors if anchors is None else anchors)[:, :2]
     names = names or [str(k + 1) for k in range(len(anchors))]
@@ -83,9 +88,7 @@ def draw_map(found: AccuracyMap, area: Any, *, names: Sequence[str] = (), anchor
     return figure
 
 
-def draw_cells(
-    plan: Plan, area: Any, cells: Sequence[Cell], ids: Sequence[str], *, anchors: Any = None
-) -> "Figure":
+def draw_cells(plan: Plan, area: Any, cells: Sequence[Cell], ids: Sequence[str], *, anchors: Any = None) -> "Figure":
     """Bayesian numbers per cell, one panel per method on one scale.
 
     Parameters
@@ -123,7 +126,7 @@ def draw_cells(
         some = np.isfinite(values[id]).any()
         title = f"{entry.name} ({'bound' if entry.kind == 'bound' else 'least possible'})"
         panel.set_title(title + ("" if some else ": no number"), loc="left", fontsize=10, pad=16)
-    figure.colorbar(scale, ax=axes, label="RMSE in m", shrink=0.85)
+    figure.colorbar(scale, ax=list(axes), label="RMSE in m", shrink=0.85)
     title = "Least RMSE of a device that is known to be in the cell"
     figure.suptitle(f"{plan.title}: {title[0].lower()}{title[1:]}" if plan.title else title, fontsize=11)
     return figure
@@ -136,7 +139,7 @@ def _panels(area: Any, anchors: ndarray, names: Sequence[str], n: int) -> tuple[
     width, height = SIDE_IN * np.maximum(high - low, 0.35 * (high - low).max()) / (high - low).max()
     wide = width > 1.6 * height
     across, down = (1, n) if wide and n > 1 else (n, 1)
-    figure = Figure(figsize=(across * (width + 1.5) + 0.4, down * (height + 1.0) + 0.9), layout="constrained")
+    figure = Figure(figsize=(across * (width + 1.5) + 0.4, down * (height + 0.85) + 0.7), layout="constrained")
     axes = figure.subplots(down, across, squeeze=False).ravel()
     outside = 0
     for panel in axes:
@@ -154,14 +157,23 @@ def _extent(found: AccuracyMap) -> tuple[float, float, float, float]:
 
 
 def _image(figure: "Figure", panel: "Axes", values: Float[ndarray, "rows columns"], extent: Any, label: str) -> None:
+    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.ticker import LogLocator
+
     some = values[np.isfinite(values)]
     low, high = (float(some.min()), float(np.quantile(some, TOP))) if some.size else (0.0, 1.0)
     if high - low < 1e-6 * max(high, 1e-300):  # one value everywhere
         low, high = 0.0, high or 1.0
     shown = np.where(np.isfinite(values), values, np.nan)
-    image = panel.imshow(shown, origin="lower", extent=extent, cmap="viridis", vmin=low, vmax=high, zorder=1)
+    wide = low > 0 and high > LOGARITHMIC * low
+    scale = (LogNorm if wide else Normalize)(low, high)
+    image = panel.imshow(shown, origin="lower", extent=extent, cmap="viridis", norm=scale, zorder=1)
     over = bool(some.size and some.max() > high * (1 + 1e-6))
-    figure.colorbar(image, ax=panel, label=label, extend="max" if over else "neither", shrink=0.85)
+    bar = figure.colorbar(image, ax=panel, label=label, extend="max" if over else "neither", shrink=0.85)
+    if wide:
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.ax.yaxis.set_major_formatter("{x:g}")
+        bar.ax.yaxis.set_minor_formatter("")
 
 
 def _mark(panel: "Axes", found: AccuracyMap, lost: ndarray, extent: Any) -> None:
@@ -196,12 +208,9 @@ def _ellipses(panel: "Axes", found: AccuracyMap) -> float:
     factor = float(steps[np.searchsorted(steps, 0.45 * spacing / largest, side="right") - 1])
     for place, semi, angle in zip(found.points[index], shapes.semi_axes_m, shapes.angle_rad, strict=True):
         size = 2 * factor * semi
-        panel.add_patch(
-            Ellipse(
-                (float(place[0]), float(place[1])), size[0], size[1], angle=float(np.degrees(angle)),
-                fill=False, edgecolor="white", lw=0.9, zorder=4,
-            )  # fmt: skip
-        )
+        middle, turn = (float(place[0]), float(place[1])), float(np.degrees(angle))
+        style = {"fill": False, "edgecolor": "white", "lw": 0.9, "zorder": 4}
+        panel.add_patch(Ellipse(middle, size[0], size[1], angle=turn, **style))
     return factor
 
 

@@ -15,13 +15,17 @@ FAR = 0.6  # anchors farther off than this, relative to the area's longer side, 
 
 
 def scale_bar(panel: "Axes") -> None:
-    """A bar of a round length, about a fifth of the picture's width, below the lower right corner of the axes."""
-    (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
-    width, height = right - left, top - bottom
-    length = max((b for b in BARS_M if b <= 0.25 * width), default=BARS_M[0])
-    x, y = right - 0.03 * width - length, top + 0.03 * height
-    panel.plot([x, x + length], [y, y], color="black", lw=3, solid_capstyle="butt", clip_on=False, zorder=9)
-    panel.text(x - 0.02 * width, y, f"{length:g} m", ha="right", va="center", fontsize=8)
+    """A bar of a round length, about a fifth of the picture's width, above the upper right corner of the axes."""
+    from matplotlib.transforms import ScaledTranslation
+
+    (left, right), top = panel.get_xlim(), panel.get_ylim()[1]
+    length = max((b for b in BARS_M if b <= 0.25 * (right - left)), default=BARS_M[0])
+    lifted = panel.transData + ScaledTranslation(0, 8 / 72, panel.figure.dpi_scale_trans)
+    ends = [right - length, right]
+    panel.plot(ends, [top, top], color="black", lw=3, solid_capstyle="butt", clip_on=False, transform=lifted)
+    panel.annotate(
+        f"{length:g} m", (ends[0], top), (-5, 8), textcoords="offset points", ha="right", va="center", fontsize=8
+    )
 
 
 def draw_anchors(panel: "Axes", anchors: Float[ndarray, "anchors 2"], names: Sequence[str]) -> None:
@@ -54,6 +58,8 @@ def draw_outline(panel: "Axes", shape: Any) -> None:
 
 def frame(panel: "Axes", low: ndarray, high: ndarray, anchors: Float[ndarray, "anchors 2"]) -> int:
     """Limits around an area and the anchors that are near it; returns how many anchors stay outside."""
+    from matplotlib.ticker import MaxNLocator
+
     size = float((high - low).max())
     near = np.all((anchors > low - FAR * size) & (anchors < high + FAR * size), axis=1)
     shown = np.vstack([low, high, anchors[near]])
@@ -62,6 +68,8 @@ def frame(panel: "Axes", low: ndarray, high: ndarray, anchors: Float[ndarray, "a
     panel.set_xlim(left, right)
     panel.set_ylim(bottom, top)
     panel.set_aspect("equal")
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(MaxNLocator(7, steps=[1, 2, 5, 10]))
     panel.set_xlabel("x in m")
     panel.set_ylabel("y in m")
     panel.tick_params(labelsize=8)
