@@ -272,8 +272,8 @@ def _bounds(plan: Plan, points: Array, verdict: Verdict | None, provenance: Prov
 def _whitener(plan: Plan) -> tuple[Any, Any, Any]:
     """L^T of ``W = L L^T`` (its diagonal if there is nothing else), the rounding of its columns, the clock's column.
 
-    Many channels whose noise shares one common part (differences to one reference) are taken as independent ones with an
-    offset of that deviation in common, which is the same and costs as many operations as there are channels.
+    Many channels whose noise shares one common part (differences to one reference) are taken as independent ones with
+    an offset of that deviation in common, which is the same and costs as many operations as there are channels.
     """
     W = plan.accuracy_with_clock
     shared = None if traced(W) or plan.size < MANY else _shared_part(plan)
@@ -297,7 +297,7 @@ def _cancelling(plan: Plan) -> np.ndarray:
 
 
 def _shared_part(plan: Plan) -> tuple[Any, Any, float] | None:
-    """Own deviations [channels], who shares the common part [channels], its deviation; None if there is no such form."""
+    """Own deviations [channels], who has the common part [channels], its deviation; None if there is no such form."""
     groups = [g for g in plan.groups if g.covariance is not None]
     correlated = [g for g in groups if np.count_nonzero(g.covariance - np.diag(np.diagonal(g.covariance)))]
     if plan.clock_std_m is not None or len(correlated) != 1:
