@@ -344,9 +344,10 @@ class Plan(eqx.Module):
     ) -> Float[Array, " points"]:
         """Smallest probability of error in deciding between two equally probable places each.
 
-        Exact for Gaussian channels, ``Q(|m(a) - m(b)| / 2)``, and for a single other channel. Otherwise the larger of
-        two valid lower bounds: ``(1 - sqrt(1 - rho^2)) / 2``, and, if all noises are Gaussian and only angles are wide,
-        the error of their unwrapped differences.
+        Exact for Gaussian channels, ``Q(|m(a) - m(b)| / 2)``, and for a single other channel. Otherwise the largest of
+        valid lower bounds: ``(1 - sqrt(1 - rho^2)) / 2``; half the product of the channels' ``2 P`` (the minimum of
+        two products is not below the product of the minima); and, if all noises are Gaussian and only angles are
+        wide, the error of their unwrapped differences.
         """
         return self.p_min(self.differences(a, b))
 
@@ -361,6 +362,10 @@ class Plan(eqx.Module):
             return its.p_min(d[..., c])
         rho = jnp.exp(self.log_rho(d))
         bound = 0.5 * rho**2 / (1 + jnp.sqrt(jnp.maximum(1 - rho**2, 0.0)))
+        product = 0.5 * erfc(jnp.sqrt(self._squares(d[..., self.gaussian])) / np.sqrt(8.0))
+        for c, its in self.tables:
+            product = product * 2 * its.p_min(d[..., c])
+        bound = jnp.maximum(bound, product)
         if all(group.noises is None or all(type(n) is Gaussian for n in group.noises) for group in self.groups):
             square = self._squares(d[..., self.gaussian])
             square = square + sum((d[..., c] / self.stds[c]) ** 2 for c, _ in self.tables)
