@@ -16,6 +16,7 @@ from .evaluation import evaluate, quantile
 from .filters import EkfBanks, Estimates, FactorisedImmEkf, ImmEkf, ImmKf, ImmKfSmoother, OracleEkf, Rbpf
 from .fit.scenario import fit_scenario
 from .io.logs import read_log
+from .io.plans import read_plan
 from .io.scenario_file import load, save
 from .io.surveys import read_survey
 from .measurement import Bearing, BySight, Elevation, Function, PathLoss, Range, RangeDifference
@@ -41,7 +42,7 @@ from .noise import (
     minimum_error,
 )
 from .plan import Observations, Plan, aoa, observe, rss, tdoa, toa
-from .priors import DensityPrior, GaussianPrior, PriorMixture, UniformBox, UniformDisc, UniformPolygon
+from .priors import DensityPrior, GaussianPrior, PriorMixture, Prism, UniformBox, UniformDisc, UniformPolygon
 from .reference import reference
 from .registry import explain
 from .report import plot
@@ -54,7 +55,9 @@ from .simulation import Draws, simulate
 from .static import merit
 from .static.barankin import barankin
 from .static.crlb import crlb
+from .static.dop import dop
 from .static.estimators import ls, ml
+from .static.maps import AccuracyMap
 from .static.mmse import mmse
 from .static.noise_levels import bounds_over_noise
 from .static.tightest import Tightest, tightest
@@ -65,6 +68,7 @@ from .times import Times
 
 __version__: str
 __all__ = [
+    "AccuracyMap",
     "AdditiveChannel",
     "AlongTrack",
     "Bearing",
@@ -113,6 +117,7 @@ __all__ = [
     "PrecisionError",
     "Prior",
     "PriorMixture",
+    "Prism",
     "RandomWalk",
     "Range",
     "RangeDifference",
@@ -141,6 +146,7 @@ __all__ = [
     "comply",
     "crlb",
     "discrete_mmse",
+    "dop",
     "enumer",
     "evaluate",
     "explain",
@@ -160,6 +166,7 @@ __all__ = [
     "plot",
     "quantile",
     "read_log",
+    "read_plan",
     "read_survey",
     "reference",
     "rss",

@@ -10,7 +10,7 @@ from locbounds.cli.app import app
 
 RUN = [sys.executable, "-c", "from locbounds.cli import main; main()"]
 HEAVY = ("jax", "equinox", "scipy", "xarray", "matplotlib", "pydantic", "tomlkit", "numpy")
-COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
+COMMANDS = [command.name or command.callback.__name__ for command in app.registered_commands if command.callback]
 
 
 def test_help_names_every_command_and_imports_nothing_heavy():

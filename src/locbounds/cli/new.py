@@ -1,4 +1,4 @@
-"""``locbounds new``: a scenario file to edit."""
+"""``locbounds new``: a scenario file, or a plan file, to edit."""
 
 from pathlib import Path
 from typing import Annotated
@@ -28,13 +28,15 @@ Rare wide errors in both conditions:
 
 def new(
     path: Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="File to write.", show_default=False)],
-    like: Annotated[str, typer.Option("--like", metavar="PAPER", help="Paper to start from.")] = "fritsche2013",
+    like: Annotated[
+        str, typer.Option("--like", metavar="PAPER", help="Paper to start from; plan: a plan for locbounds map.")
+    ] = "fritsche2013",
     motion: Annotated[
         str, typer.Option("--motion", metavar="MODEL", help="constant-velocity, random-walk or constant-acceleration.")
     ] = "constant-velocity",
     force: ForceOption = False,
 ) -> None:
-    """Write a commented scenario file to edit.
+    """Write a commented scenario file to edit, or with --like plan a plan file for locbounds map.
 
     Example: locbounds new scenario.toml --like fritsche2013
     """
@@ -43,6 +45,13 @@ def new(
     from locbounds.io.scenario_file import save
 
     refuse_existing(path, force=force)
+    if like == "plan":
+        from locbounds.io.files import atomic_write_text
+        from locbounds.io.plan_example import PLAN
+
+        atomic_write_text(path, PLAN.format(name=path))
+        typer.echo(f"wrote {path}; next: locbounds map {path}")
+        return
     comments = {"": HEADER.format(name=path), "motion": MOTION, "links": LINKS.format()}
     save(_moving(paper(like).scenario(), motion), path, comments)
     typer.echo(f"wrote {path}; next: locbounds check {path}")

@@ -35,13 +35,13 @@ def is_degrees(name: str) -> bool:
 DEGREES_REMEDY = "Positions are metres in a local plane: project latitude and longitude first (for example to UTM)"
 
 
-def unknown_key_remedy(name: str, known: list[str]) -> str:
+def unknown_key_remedy(name: str, known: list[str], root: type[BaseModel] = ScenarioFile) -> str:
     """What to do about an unknown key or column."""
     if is_degrees(name):
         return DEGREES_REMEDY
     close = close_key(name, known)
     hint = f"Did you mean {close}? " if close else ""
-    if close is None and (section := _section_of(name)):
+    if close is None and (section := _section_of(name, root)):
         hint = f"It belongs in {section}. "
     return f"{hint}Known here: {', '.join(known)}"
 
@@ -58,9 +58,9 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
     return next((m for m in map(_model_in, get_args(annotation)) if m), None)
 
 
-def _schema_at(location: tuple) -> tuple[type[BaseModel], str]:
+def _schema_at(location: tuple, root: type[BaseModel]) -> tuple[type[BaseModel], str]:
     """The table that holds the last key of a location, and the line that teaches that key."""
-    model, teaching = ScenarioFile, ""
+    model, teaching = root, ""
     for depth, part in enumerate(location):
         field = model.model_fields.get(part) if isinstance(part, str) else None
         if field is None:
@@ -73,8 +73,8 @@ def _schema_at(location: tuple) -> tuple[type[BaseModel], str]:
     return model, teaching
 
 
-def _section_of(name: str) -> str | None:
-    for section, field in ScenarioFile.model_fields.items():
+def _section_of(name: str, root: type[BaseModel]) -> str | None:
+    for section, field in root.model_fields.items():
         if section == name:
             return "the top of the file, before the first [section]"
         model = _model_in(field.annotation)
@@ -83,15 +83,15 @@ def _section_of(name: str) -> str | None:
     return None
 
 
-def _explain(error: Any) -> tuple[str, str]:
+def _explain(error: Any, root: type[BaseModel]) -> tuple[str, str]:
     location, kind, value = error["loc"], error["type"], error["input"]
     path = ".".join(str(part) for part in location)
-    model, teaching = _schema_at(location)
+    model, teaching = _schema_at(location, root)
     name = next((part for part in reversed(location) if isinstance(part, str)), "")
     remedy = f"{name}: {teaching}" if teaching else ""
     if kind == "extra_forbidden":
         cause = f"unknown key {path} = {quoted(value)}"
-        return cause, unknown_key_remedy(str(location[-1]), list(model.model_fields))
+        return cause, unknown_key_remedy(str(location[-1]), list(model.model_fields), root)
     if kind == "missing":
         return f"{path} is missing", f"Add {remedy}"
     if kind == "locbounds":
@@ -102,7 +102,7 @@ def _explain(error: Any) -> tuple[str, str]:
     return f"{path} is {quoted(value)}: {error['msg']}", remedy
 
 
-def complain(error: ValidationError, source: str) -> InputError:
+def complain(error: ValidationError, source: str, root: type[BaseModel] = ScenarioFile) -> InputError:
     """The most telling of the errors of a validation; unknown keys come first, since they explain missing ones.
 
     Parameters
@@ -111,9 +111,11 @@ def complain(error: ValidationError, source: str) -> InputError:
         From pydantic.
     source
         Name of the file, put in front of the cause.
+    root
+        What the whole file was validated as.
     """
     errors = error.errors(include_url=False)
     first = min(errors, key=lambda e: e["type"] != "extra_forbidden")
-    cause, remedy = _explain(first)
+    cause, remedy = _explain(first, root)
     more = f" ({len(errors) - 1} more after this one)" if len(errors) > 1 else ""
     return InputError(f"{source}: {cause}{more}", remedy)

@@ -66,7 +66,7 @@ def distance(position: Float[Array, "*n space"], anchor: Float[Array, " space"])
     >>> float(distance(np.array([3.0, 4.0]), np.zeros(2)))
     5.0
     """
-    square = jnp.sum((position - anchor) ** 2, axis=-1)
+    square = _square(position - anchor)
     safe = jnp.where(square > 0, square, 1.0)
     return jnp.where(square > 0, jnp.sqrt(safe), 0.0)
 
@@ -75,4 +75,9 @@ def far(points: Float[Array, "points space"], anchor: Float[Array, " space"]) ->
     """Distance of points from an anchor; NumPy stays NumPy."""
     difference = points - anchor
     xp = jnp if isinstance(difference, jax.Array) else np
-    return xp.sqrt(xp.sum(difference**2, axis=-1))
+    return xp.sqrt(_square(difference))
+
+
+def _square(difference: Any) -> Any:
+    """Squared length; coordinate by coordinate, which compiles to loops over the points."""
+    return sum(difference[..., i] ** 2 for i in range(difference.shape[-1]))

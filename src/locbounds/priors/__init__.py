@@ -5,6 +5,7 @@ from locbounds.priors.gaussian import GaussianPrior
 from locbounds.priors.mixture import PriorMixture
 from locbounds.priors.polygon import UniformPolygon
 from locbounds.priors.position import PositionPrior
+from locbounds.priors.prism import Prism
 from locbounds.priors.uniform import UniformBox, UniformDisc
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "GaussianPrior",
     "PositionPrior",
     "PriorMixture",
+    "Prism",
     "UniformBox",
     "UniformDisc",
     "UniformPolygon",

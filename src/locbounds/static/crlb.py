@@ -288,7 +288,7 @@ def _kernel(parts: list, counts: tuple[int, ...], order: Any, root: Any, floor: 
     d = len(x)
     H = _slopes(parts, counts, order, x)
     G = [root[:, None] * h if root.ndim == 1 else root @ h for h in H]
-    size = jnp.maximum(jnp.sqrt(jnp.max(jnp.stack([jnp.sum(g**2, 0) for g in G]), 0)), floor)
+    size = jnp.maximum(jnp.sqrt(_fold(jnp.maximum, jnp.stack([_fold(jnp.add, g**2) for g in G]))), floor)
     rows = jnp.zeros_like(x[:1])
     if clock is not None:  # what a prior on the clock adds is one more row
         column, known = clock
@@ -297,9 +297,10 @@ def _kernel(parts: list, counts: tuple[int, ...], order: Any, root: Any, floor: 
     C = _inverse_gram(R)
     k = len(G) - d
     near = [
-        jax.vmap(lambda m: m.singular(x.T), axis_size=n)(part).min(0) for part, n in zip(parts, counts, strict=True)
+        jax.vmap(lambda m: jax.vmap(lambda p: m.singular(p[None])[0], in_axes=1)(x), axis_size=n)(part)
+        for part, n in zip(parts, counts, strict=True)
     ]
-    at_anchor = jnp.min(jnp.stack(near), 0) <= AT_ANCHOR_M
+    at_anchor = _fold(jnp.minimum, jnp.concatenate(near)) <= AT_ANCHOR_M
     status = jnp.where(at_anchor, 2, jnp.where(ok, 0, 1)).astype(jnp.int8)
     good = status == 0
     columns = [
@@ -326,16 +327,25 @@ def _gram_schmidt(G: list[Any], size: Array, first_free: bool) -> tuple[list[lis
     R: list[list[Array]] = [[jnp.zeros_like(size)] * len(G) for _ in G]
     ok = jnp.ones(size.shape, dtype=bool)
     for i in range(len(G)):
-        square = jnp.sum(G[i] ** 2, 0)
+        square = _fold(jnp.add, G[i] ** 2)
         least = (SINGULAR * size) ** 2 if not (first_free and i == 0) else jnp.zeros_like(size)
         good = square > least
         ok = ok & good
         R[i][i] = jnp.where(good, jnp.sqrt(jnp.where(good, square, 1.0)), 1.0)
         q = G[i] / R[i][i]
         for j in range(i + 1, len(G)):
-            R[i][j] = jnp.sum(q * G[j], 0)
+            R[i][j] = _fold(jnp.add, q * G[j])
             G = [*G[:j], G[j] - q * R[i][j], *G[j + 1 :]]
     return R, ok
+
+
+def _fold(op: Any, rows: Array) -> Array:
+    """Rows [k, n] combined into one, by halves: unlike a reduction over the first axis, loops over n are vectorised."""
+    while len(rows) > 1:
+        half = len(rows) // 2
+        folded = op(rows[:half], rows[half : 2 * half])
+        rows = folded if len(rows) == 2 * half else jnp.concatenate([folded, rows[-1:]])
+    return rows[0]
 
 
 def _inverse_gram(R: list[list[Any]]) -> dict[int, dict[int, Any]]:

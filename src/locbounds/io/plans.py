@@ -1,0 +1,380 @@
+"""Plan files: TOML, from what is measured and where to a :class:`~locbounds.Plan` and the area of its maps."""
+
+import math
+import os
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import ValidationError
+
+from locbounds.errors import InputError
+from locbounds.io.anchors_csv import read_anchors
+from locbounds.io.build import at, build_noises
+from locbounds.io.complain import close_key, complain, quoted
+from locbounds.io.plan_schema import AreaSection, PlanAnchor, PlanFile, PlanLinks, PriorTable, Shape
+from locbounds.io.schema import NlosTable, NoiseTable
+from locbounds.noise import Gaussian, Noise
+from locbounds.plan import FLAT, Plan, aoa, rss, soft, tdoa, toa
+from locbounds.priors import GaussianPrior, PositionPrior, PriorMixture, Prism, UniformBox, UniformDisc, UniformPolygon
+
+UNITS = {"toa": ("m",), "tdoa": ("m",), "rss": ("db",), "aoa": ("rad", "deg")}
+NOISES = ("los", "nlos", "outlier")
+WORDS = {"db": "dB", "rad": "radians", "m": "metres"}
+
+
+class PlanMap(NamedTuple):
+    """What a plan file says.
+
+    Attributes
+    ----------
+    plan : Plan
+    area : PositionPrior
+        Uniform law of the plane over the area of the map.
+    height_m : float or None
+        In 3-D: height of the map.
+    heights_m : tuple of float or None
+        In 3-D: lowest and highest position of the device, if the file gives them.
+    names, positions
+        Of the anchors; positions [anchors, space] in metres.
+    left_out : tuple of str
+        Anchors that are known to be NLOS and tell nothing.
+    notes : tuple of str
+        What a reader of the results should know.
+    """
+
+    plan: Plan
+    area: PositionPrior
+    height_m: float | None
+    heights_m: tuple[float, float] | None
+    names: tuple[str, ...]
+    positions: np.ndarray
+    left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def read_plan(path: str | os.PathLike) -> PlanMap:
+    r"""A plan from a plan file.
+
+    Parameters
+    ----------
+    path
+        TOML; a relative ``anchors_csv`` in it is relative to the file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or a value not be used; the error names key, value, remedy and nearest known key.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from locbounds.io.plan_example import PLAN
+    >>> path = Path(tempfile.mkdtemp()) / "plan.toml"
+    >>> _ = path.write_text(PLAN.format(name="plan.toml"))
+    >>> read_plan(path).plan.channel_names
+    ('a2-a1', 'a3-a1', 'a4-a1')
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        missing = isinstance(error, FileNotFoundError)
+        remedy = f"Make one with: locbounds new {path} --like plan" if missing else "Give a TOML file"
+        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}", remedy) from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not a text file in UTF-8", "Save it as UTF-8") from error
+    return read_text(text, folder=path.parent, source=path.name)
+
+
+def read_text(text: str, *, folder: str | os.PathLike = ".", source: str = "plan") -> PlanMap:
+    r"""A plan from the text of a plan file; as :func:`read_plan`.
+
+    >>> try:
+    ...     read_text('format = 1\n[area]\ncenter_m = [0, 0]\nradius_m = 9\n[links]\nmeasure = "rss"\nlos.std_m = 4')
+    ... except InputError as error:
+    ...     print(error.cause, error.remedy, sep="\n")
+    plan: unknown key links.los.std_m = 4
+    Did you mean std_db? The errors of "rss" are in dB
+    """
+    try:
+        keys = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(
+            f"{source} is not valid TOML: {error}", "Look at that line: quotes, brackets, one key = value per line"
+        ) from error
+    units: dict[str, str] = {}
+    try:
+        file = PlanFile.model_validate(_in_metres(keys, units))
+        return _build(file, Path(folder))
+    except ValidationError as error:
+        told = complain(error, source, PlanFile)
+        unit = _unit_of(told.cause, units)
+        raise InputError(_in_units(told.cause, unit), _in_units(told.remedy, unit)) from None
+    except InputError as error:
+        raise InputError(f"{source}: {error.cause}", error.remedy) from error
+
+
+def _in_metres(keys: dict[str, Any], units: dict[str, str]) -> dict[str, Any]:
+    """Noise tables of strengths and angles with the keys of the tables of ranges; fills in the unit by path."""
+    links = keys.get("links")
+    shared = links.get("measure") if isinstance(links, dict) else None
+    found = dict(keys)
+    if isinstance(links, dict):
+        found["links"] = _renamed(links, shared, "links", units)
+    if isinstance(keys.get("anchors"), dict):
+        found["anchors"] = {
+            name: _renamed(a, a.get("measure", shared), f"anchors.{name}", units) if isinstance(a, dict) else a
+            for name, a in keys["anchors"].items()
+        }
+    return found
+
+
+def _renamed(table: dict[str, Any], measure: Any, path: str, units: dict[str, str]) -> dict[str, Any]:
+    if not isinstance(measure, str) or measure not in UNITS:
+        return table
+    units[path] = UNITS[measure][0]
+    return {k: _noise(v, measure, f"{path}.{k}") if k in NOISES else v for k, v in table.items()}
+
+
+def _noise(value: Any, measure: str, path: str) -> Any:
+    if isinstance(value, list):
+        return [_noise(v, measure, path) for v in value]
+    if not isinstance(value, dict):
+        return value
+    out = {}
+    for name, inner in value.items():
+        stem, _, unit = name.rpartition("_")
+        if stem and unit in ("m", "db", "rad", "deg"):
+            if unit not in UNITS[measure]:
+                words = WORDS[UNITS[measure][0]]
+                known = [f"{stem}_{u}" for u in UNITS[measure]]
+                raise InputError(
+                    f"unknown key {path}.{name} = {quoted(inner)}",
+                    f'Did you mean {" or ".join(known)}? The errors of "{measure}" are in {words}',
+                )
+            out[f"{stem}_m"] = _scaled(inner, math.pi / 180) if unit == "deg" else inner
+        else:
+            out[name] = _noise(inner, measure, f"{path}.{name}")
+    return out
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    if isinstance(value, list):
+        return [_scaled(v, factor) for v in value]
+    return value * factor if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+def _unit_of(cause: str, units: dict[str, str]) -> str:
+    paths = sorted((p for p in units if f"{p}." in cause), key=len)
+    return units[paths[-1]] if paths else "m"
+
+
+def _in_units(text: str, unit: str) -> str:
+    if unit == "m":
+        return text
+    names = {n for table in (NoiseTable, NlosTable) for n in table.model_fields if n.endswith(("_m", "s_m"))}
+    for name in sorted(names, key=len, reverse=True):
+        text = re.sub(rf"\b{name}\b", f"{name[:-1]}{unit}", text)
+    return text.replace("in metres", f"in {WORDS[unit]}")
+
+
+def _build(file: PlanFile, folder: Path) -> PlanMap:
+    positions = {} if file.anchors_csv is None else read_anchors(folder / file.anchors_csv)
+    for name, own in file.anchors.items():
+        if own.position_m is not None:
+            positions[name] = own.position_m
+        elif name not in positions:
+            raise InputError(
+                f"anchor {name} has no position" + (f" and is not in {file.anchors_csv}" if file.anchors_csv else ""),
+                f"anchors.{name}.position_m: {PlanAnchor.model_fields['position_m'].description}",
+            )
+    if not positions:
+        raise InputError("there are no anchors", "Add [anchors] with a line NAME = { position_m = [x, y] } each")
+    dims = {len(p) for p in positions.values()}
+    if len(dims) > 1:
+        raise InputError("anchors have 2 and 3 coordinates", "Use the same number of coordinates everywhere")
+    dim = dims.pop()
+    area, height, prior = _area(file.area, dim)
+    heights = (float(prior.low), float(prior.high)) if isinstance(prior, Prism) else None
+    if file.prior is not None:
+        with at("prior"):
+            prior = _prior(file.prior, dim)
+    plan, left_out, notes = _measured(file, positions)
+    plan = plan.replace(title=file.title, prior=prior, area=None)
+    few = plan.too_few()
+    if few:
+        raise InputError(
+            f"{few}: there are {plan.size} measured numbers of {len(positions) - len(left_out)} anchors",
+            "Add anchors or measurements" + (", or give NLOS links a noise (nlos)" if left_out else ""),
+        )
+    places = np.array(list(positions.values()))
+    return PlanMap(plan, area, height, heights, tuple(positions), places, left_out, notes)
+
+
+def _region(shape: Shape, path: str) -> PositionPrior:
+    """A region of the plane, or a box."""
+    with at(path):
+        if shape.outline_m is not None:
+            for name, rings in (("outline_m", [shape.outline_m]), ("holes_m", shape.holes_m or [])):
+                if any(len(corner) != 2 for ring in rings for corner in ring):
+                    raise InputError(f"{name} has corners of three coordinates", "Give [x, y]; heights are height_m")
+            return UniformPolygon(shape.outline_m, shape.holes_m or ())
+        if shape.center_m is not None:
+            return UniformDisc(shape.center_m, shape.radius_m)
+        return UniformBox(shape.low_m, shape.high_m)
+
+
+def _area(area: AreaSection, dim: int) -> tuple[PositionPrior, float | None, PositionPrior | None]:
+    """Region of the plane, height of the map, and the prior that is uniform over it."""
+    region, height = _region(area, "area"), area.height_m
+    span = height if isinstance(height, list) else None
+    if height is not None:
+        numbers = span or [height]
+        if any(isinstance(h, bool) or not isinstance(h, int | float) or not math.isfinite(h) for h in numbers) or (
+            span is not None and (len(span) != 2 or not span[0] < span[1])
+        ):
+            raise InputError(
+                f"area.height_m is {quoted(height)}", "Give a height in metres, or [lowest, highest] of the device"
+            )
+    if dim == 2:
+        if height is not None or region.dim == 3:
+            raise InputError(
+                "the area has heights, the anchors do not", "Give anchors three coordinates, or no heights"
+            )
+        return region, None, region
+    if region.dim == 3:
+        if height is not None:
+            raise InputError("area has height_m and corners of three coordinates", "Keep one of them")
+        span = [float(region.low[2]), float(region.high[2])]
+        region = UniformBox(region.low[:2], region.high[:2])
+    if span is not None:
+        return region, 0.5 * (span[0] + span[1]), Prism(region, *span)
+    if height is None:
+        raise InputError(
+            "the anchors have heights, the area has none", "area.height_m: the height of the map, or [lowest, highest]"
+        )
+    return region, float(height), None
+
+
+def _prior(table: PriorTable, dim: int) -> PositionPrior:
+    if table.mixture is not None:
+        shares = [part.share or 0.0 for part in table.mixture]
+        if abs(sum(shares) - 1) > 1e-9:
+            raise InputError(f"the shares of the mixture sum to {sum(shares):.6g}", "Shares must sum to one")
+        return PriorMixture(shares, [_prior(part, dim) for part in table.mixture])
+    if table.position_m is not None:
+        spread, n = np.asarray(table.position_std_m, dtype=float), len(table.position_m)
+        if spread.ndim == 1 and len(spread) != n:
+            raise InputError(f"position_m has {n} coordinates, position_std_m {len(spread)}", "Give as many of each")
+        prior: PositionPrior = GaussianPrior(table.position_m, spread if spread.ndim == 2 else np.eye(n) * spread**2)
+    else:
+        prior = _region(table, "region")
+    if prior.dim != dim:
+        raise InputError(f"it has {prior.dim} coordinates, the anchors have {dim}", "Use the same number everywhere")
+    return prior
+
+
+class _Link(NamedTuple):
+    name: str
+    position: tuple[float, ...]
+    table: PlanLinks
+    noise: Noise | None
+
+
+def _links(file: PlanFile, positions: dict[str, tuple[float, ...]]) -> list[_Link]:
+    shared = {k: getattr(file.links, k) for k in file.links.model_fields_set}
+    out = []
+    for name, position in positions.items():
+        own = file.anchors.get(name)
+        mine = {} if own is None else {k: getattr(own, k) for k in own.model_fields_set}
+        table = PlanAnchor.model_construct(**{**shared, **mine})
+        if table.measure is None:
+            raise InputError(
+                f"anchors.{name} has no measure, and neither has [links]",
+                f"Add measure to [links]: {PlanLinks.model_fields['measure'].description}",
+            )
+        borrowed = [k for k in NOISES if getattr(table, k) is not None and k not in mine]
+        if borrowed and UNITS[table.measure] != UNITS.get(file.links.measure or "", UNITS[table.measure]):
+            unit = UNITS[table.measure][0]
+            raise InputError(
+                f'anchors.{name} measures "{table.measure}", but its {", ".join(borrowed)} of [links] is that of '
+                f'"{file.links.measure}"',
+                f"Give the anchor noise of its own, for example los = {{ std_{unit} = .. }}",
+            )
+        if table.los is None:
+            raise InputError(
+                f"anchors.{name} has no los, and neither has [links]",
+                f"Add los to [links]: {PlanLinks.model_fields['los'].description}",
+            )
+        for k, measure in (("exponent", "rss"), ("near_field_m", "rss"), ("reference", "tdoa")):
+            if k in mine and table.measure != measure:
+                raise InputError(f'anchors.{name} has {k}, but measures "{table.measure}"', f"Remove {k}")
+        with at(f"anchors.{name}"):
+            los, nlos = build_noises(table.los, table.nlos or NlosTable(std_m=1.0), table.outlier)
+            noise = soft(los, nlos if table.nlos is not None else None, table.nlos_probability())
+        out.append(_Link(name, position, table, noise))
+    return out
+
+
+def _measured(file: PlanFile, positions: dict[str, tuple[float, ...]]) -> tuple[Plan, tuple[str, ...], tuple[str, ...]]:
+    links = _links(file, positions)
+    left_out = tuple(link.name for link in links if link.noise is None)
+    by = {m: [k for k in links if k.noise is not None and k.table.measure == m] for m in UNITS}
+    if not any(by.values()):
+        raise InputError("every link is NLOS and carries nothing", "Give NLOS links a noise (nlos), or a known LOS")
+    clock = FLAT if file.clock == "unknown" else file.clock_std_m
+    notes: list[str] = []
+    if left_out:
+        notes.append(f"NLOS and without information, left out: {', '.join(left_out)}")
+    if by["tdoa"] and not all(type(k.noise) is Gaussian for k in by["tdoa"]):
+        if by["toa"] and clock is None:
+            raise InputError(
+                "times of arrival with a known clock beside differences whose noise is not Gaussian",
+                'Use measure = "toa" with clock = "unknown" for the differences in a plan of their own',
+            )
+        notes.append("differences of arrival times with noise that is not Gaussian: arrival times of an unknown clock")
+        by["toa"], by["tdoa"], clock = by["toa"] + by["tdoa"], [], FLAT
+    if clock is not None and not by["toa"]:
+        raise InputError('the plan has an unknown clock, and no "toa"', "Remove clock: differences need none")
+    plan: Plan | None = None
+    for measure, group in by.items():
+        if group:
+            made = _group(measure, group, clock, file.links.reference)
+            plan = made if plan is None else plan + made
+    assert plan is not None
+    return plan, left_out, tuple(notes)
+
+
+def _group(measure: str, group: list[_Link], clock: float | None, reference: str | None) -> Plan:
+    places, names = [k.position for k in group], [k.name for k in group]
+    noises: Any = [k.noise for k in group]
+    if all(type(noise) is Gaussian for noise in noises):
+        noises = [float(noise.std) for noise in noises]
+    if measure == "toa":
+        return toa(places, noises, clock_std_m=clock, names=names)
+    if measure == "tdoa":
+        chosen = names[0] if reference is None else reference
+        if chosen not in names:
+            near = close_key(chosen, names)
+            raise InputError(
+                f'links.reference is "{chosen}", which measures no differences',
+                f"{f'Did you mean {near}? ' if near else ''}Known: {', '.join(names)}",
+            )
+        if len(group) < 2:
+            raise InputError(
+                f'only anchor {names[0]} measures "tdoa"', "A difference needs two anchors: add one, or measure toa"
+            )
+        return tdoa(places, noises, reference=names.index(chosen), names=names)
+    if measure == "rss":
+        parts = [
+            rss([k.position], [n], exponent=k.table.exponent or 3.0, near_field_m=k.table.near_field_m, names=[k.name])
+            for k, n in zip(group, noises, strict=True)
+        ]
+        total = parts[0]
+        for part in parts[1:]:
+            total = total + part
+        return total
+    return aoa(places, noises, names=names)
