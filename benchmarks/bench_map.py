@@ -83,7 +83,9 @@ def main(largest: int = 1000) -> None:
     places, points = anchors(4), grid(SIDE)
     plan = lb.tdoa(places, 2.0)
     best, middle = seconds(ours(plan, points))
-    print(f"TDoA, 4 anchors, {SIDE} x {SIDE} points, CRLB and exact CEP: {1e3 * best:.2f} ms (median {1e3 * middle:.2f})")
+    print(
+        f"TDoA, 4 anchors, {SIDE} x {SIDE} points, CRLB and exact CEP: {1e3 * best:.2f} ms (median {1e3 * middle:.2f})"
+    )
     C = numpy_way(places, points, 2.0)
     theirs, _ = seconds(lambda: rule_of_thumb(numpy_way(places, points, 2.0)))
     found = lb.crlb(plan, points)
