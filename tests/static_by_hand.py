@@ -11,19 +11,43 @@ def grid(inside, low, high, step):
     return points[inside(points)]
 
 
-def weiss_weinstein(points, step, inside, means, H):
-    """WWB matrix of a uniform prior and unit Gaussian noise, all expectations over the same cells."""
+def gaussian(means):
+    """Bhattacharyya coefficient and error probability of unit Gaussian noise, as functions of two sets of places."""
+
+    def squares(a, b):
+        return np.square(means(a) - means(b)).sum(-1)
+
+    return lambda a, b: np.exp(-squares(a, b) / 8), lambda a, b: 0.5 * erfc(np.sqrt(squares(a, b) / 8))
+
+
+def wrapped(angles, std, cells=400):
+    """The same of angles with wide normal noise; for the error the lower bound from their shorter difference."""
+    w = -np.pi + 2 * np.pi * np.arange(cells) / cells
+    turns = 2 * np.pi * np.arange(-8, 9)
+
+    def density(x):
+        return np.exp(-0.5 * ((x[:, None] + turns) / std) ** 2).sum(1) / (std * np.sqrt(2 * np.pi))
+
+    at = np.linspace(0, np.pi, 200)
+    table = np.array([np.sum(np.sqrt(density(w) * density(w - d))) * 2 * np.pi / cells for d in at])
+
+    def gaps(a, b):
+        return np.abs(np.angle(np.exp(1j * (angles(a) - angles(b)))))
+
+    return (
+        lambda a, b: np.interp(gaps(a, b), at, table).prod(-1),
+        lambda a, b: 0.5 * erfc(np.linalg.norm(gaps(a, b), axis=-1) / std / np.sqrt(8)),
+    )
+
+
+def weiss_weinstein(points, step, inside, affinity, H):
+    """WWB matrix of a uniform prior, all expectations over the same cells."""
     area = len(points) * step ** points.shape[1]
     tests = list(H.T)
 
-    def root(u):
-        return inside(points + u) / np.sqrt(area)
-
-    def affinity(u, v):
-        return np.exp(-np.square(means(points + u) - means(points + v)).sum(-1) / 8)
-
     def integral(u, v):
-        return np.sum(root(u) * root(v) * affinity(u, v)) * step ** points.shape[1]
+        both = points[inside(points + u) & inside(points + v)]
+        return np.sum(affinity(both + u, both + v)) * step ** points.shape[1] / area
 
     mu = np.array([integral(0 * h, h) for h in tests])
     q = np.array(
@@ -32,14 +56,13 @@ def weiss_weinstein(points, step, inside, means, H):
     return (H * mu) @ np.linalg.inv(q) @ (H * mu).T
 
 
-def ziv_zakai(points, step, inside, means, a, longest, cells=400):
-    """EZZB along a, shifts along a, a uniform prior and unit Gaussian noise."""
+def ziv_zakai(points, inside, error, a, longest, cells=400):
+    """EZZB along a, shifts along a, a uniform prior."""
     h = (np.arange(cells) + 0.5) * longest / cells
     A = []
     for k in h:
-        both = inside(points + k * a)
-        d = np.linalg.norm(means(points[both] + k * a) - means(points[both]), axis=-1)
-        A.append(np.sum(erfc(d / np.sqrt(8))) / len(points))
+        both = points[inside(points + k * a)]
+        A.append(np.sum(2 * error(both, both + k * a)) / len(points))
     filled = np.maximum.accumulate(np.array(A)[::-1])[::-1]
     return 0.5 * np.sum(h * filled) * longest / cells
 
@@ -47,6 +70,18 @@ def ziv_zakai(points, step, inside, means, a, longest, cells=400):
 def joint_in_one_dimension(prior, mean, std, theta, z):
     """Joint density [theta, z] of a position on a line and one measurement."""
     return prior(theta)[:, None] * np.exp(-0.5 * ((z - mean(theta)[:, None]) / std) ** 2) / (std * np.sqrt(2 * np.pi))
+
+
+def least_error_of_two_ranges(points, anchors, std, dz):
+    """Least mean square error of a uniform prior and two ranges: every posterior on a grid of measurements."""
+    r = np.linalg.norm(points[:, None] - anchors, axis=-1)
+    one, two = (
+        np.exp(-0.5 * ((np.arange(c.min() - 5 * std, c.max() + 5 * std, dz)[:, None] - c) / std) ** 2) for c in r.T
+    )
+    moments = [(one * w) @ two.T for w in (np.ones(len(points)), *points.T)]
+    known = sum(m**2 for m in moments[1:]) / moments[0]
+    share = dz**2 / (2 * np.pi * std**2 * len(points))
+    return np.mean(np.square(points).sum(1)) - np.sum(known) * share
 
 
 def weiss_weinstein_from_densities(joint, shifts, exponent, step, dz):

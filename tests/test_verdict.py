@@ -50,13 +50,17 @@ def test_every_method_has_an_id_a_function_and_words(id):
 
 BOUNDS = {"bcrb": lb.bcrb, "enumer": lb.enumer, "los-only": lb.los_only, "known-sight": lb.known_sight}
 
+OF_PLANS = {"crlb": lb.crlb, "barankin": lb.barankin, "wwb": lb.wwb, "ezzb": lb.ezzb, "mmse": lb.mmse, "ml": lb.ml,
+            "ls": lb.ls}  # fmt: skip
+
 
 def test_the_table_of_bounds_is_complete():
     assert {m.id for m in bounds_of("scenario")} == set(BOUNDS)
     assert found(METHODS["survey"].function) is lb.survey_bound
     assert [m.id for m in bounds_of("survey")] == ["survey"]
-    for id, bound in BOUNDS.items():
-        assert found(METHODS[id].function) is bound
+    assert {m.id for m in METHODS.values() if m.subject == "plan"} == set(OF_PLANS)
+    for id, function in (BOUNDS | OF_PLANS).items():
+        assert found(METHODS[id].function) is function
 
 
 @pytest.mark.parametrize("id", BOUNDS)

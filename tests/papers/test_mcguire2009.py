@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import locbounds as lb
 import static_by_hand as by_hand
 from locbounds.cli.app import app
 from locbounds.papers import mcguire2009 as study
@@ -19,7 +20,9 @@ from locbounds.papers.mcguire2009.simple import (
     inverse_expected_information,
 )
 from locbounds.papers.mcguire2009.statements import FAILS, HOLDS, PARTLY
+from locbounds.registry import method
 from locbounds.static.noise_levels import bounds_over_noise
+from locbounds.verdict import Status
 
 CELLS = 5e-3  # of sums over cells
 SIGMAS = {"m": {0.5, 1, 2, 3, 5, 8, 12, 20}, "dB": {0.5, 1, 2, 4, 8}, "rad": {0.02, 0.05, 0.1, 0.2, 0.4, 0.8}}
@@ -37,26 +40,58 @@ def test_every_kind_stands_in_a_figure_at_both_radii():
     assert set(study.FIGURE_OF.values()) == {"fig3", "fig4", "fig5", "fig6"}
 
 
-@pytest.mark.parametrize(("k", "sigma"), [(0, 5.0), (4, 8.0)])
-def test_bounds_of_a_setting_from_sums(k, sigma):
-    case = study.CASES[k]
+def laws(case, sigma):
+    """Coefficients of a case written down once more: time differences as times without their mean, angles wrapped."""
     stations = anchors(case.radius_m)
+
+    def angles(p):
+        gap = p[:, None] - stations
+        return np.arctan2(gap[..., 1], gap[..., 0])
 
     def means(p):
         r = np.linalg.norm(p[:, None] - stations, axis=-1)
+        if case.kind == "TDoA":
+            r = r - r.mean(1, keepdims=True)
         return (30 * np.log10(r) if case.kind == "RSS" else r) / sigma
 
-    (level,) = bounds_over_noise(case.plan(), [sigma], rtol=1e-3)
-    points = by_hand.grid(in_disc, [-15, -15], [15, 15], 0.125)
-    slow = by_hand.weiss_weinstein(points, 0.125, in_disc, means, level.length_m * np.eye(2))
+    return by_hand.wrapped(angles, sigma) if case.kind == "AoA" else by_hand.gaussian(means)
+
+
+@pytest.mark.parametrize(("name", "sigma"), [("TDoA R_BS=5 m", 1.0), ("RSS R_BS=5 m", 8.0), ("AoA R_BS=5 m", 0.8)])
+def test_bounds_of_a_setting_from_sums(name, sigma):
+    case = next(c for c in study.CASES if c.name == name)
+    affinity, error = laws(case, sigma)
+    (level,) = bounds_over_noise(case.plan(), [sigma], printed=False, rtol=2e-3)
+    points = by_hand.grid(in_disc, [-15, -15], [15, 15], 0.2)
+    slow = by_hand.weiss_weinstein(points, 0.2, in_disc, affinity, level.length_m * np.eye(2))
     assert level.wwb_m == pytest.approx(np.sqrt(np.trace(slow)), rel=CELLS)
-    points = by_hand.grid(in_disc, [-15, -15], [15, 15], 0.25)
-    slow = sum(by_hand.ziv_zakai(points, 0.25, in_disc, means, a, 30.0, cells=100) for a in np.eye(2))
+    points = by_hand.grid(in_disc, [-15, -15], [15, 15], 0.3)
+    slow = sum(by_hand.ziv_zakai(points, in_disc, error, a, 30.0, cells=120) for a in np.eye(2))
     assert level.ezzb_m == pytest.approx(np.sqrt(slow), rel=CELLS)
 
 
+@pytest.mark.parametrize("case", study.CASES[::3], ids=lambda c: c.name)
+def test_bounds_are_below_the_least_error(case):
+    """One noise level of some cases; the slow test of all figures has all of all."""
+    sigma = case.sigmas[len(case.sigmas) // 2]
+    (level,) = bounds_over_noise(case.plan(), [sigma], printed=False, rtol=1e-2)
+    least = lb.mmse(case.plan(sigma), rtol=0.02)
+    top = least.mean_position_rmse() + 4 * least.mean_position_rmse_stderr()
+    assert 0.3 * top < level.wwb_m < top
+    assert 0.5 * top < level.ezzb_m < top
+
+
+@pytest.mark.parametrize("case", study.CASES, ids=lambda c: c.name)
+def test_the_bayesian_cramer_rao_bound_is_refused_where_the_chapter_has_none(case):
+    """On the disc always; with a smooth prior for strengths and angles, whose expected information is infinite."""
+    assert method("bcrb").verdict(case.plan()).status is Status.REFUSED
+    smooth = case.plan().replace(prior=lb.GaussianPrior([0.0, 0.0], 56.25 * np.eye(2)))
+    expected = Status.REFUSED if case.kind in ("RSS", "AoA") else Status.VALID
+    assert method("bcrb").verdict(smooth).status is expected
+
+
 def test_mean_local_bounds_from_sums():
-    points = by_hand.grid(in_disc, [-15, -15], [15, 15], 0.1)
+    points = by_hand.grid(in_disc, [-15, -15], [15, 15], 0.15)
     for case in study.CASES:
         gap = points[:, None] - anchors(case.radius_m)
         r = np.linalg.norm(gap, axis=-1, keepdims=True)

@@ -41,15 +41,15 @@ AREAS = {
 @pytest.mark.parametrize("std", [0.7, 3.0])
 def test_both_bounds_on_an_area(area, std):
     prior, inside, low, high = AREAS[area]
-    means = ranges(std)
+    affinity, error = by_hand.gaussian(ranges(std))
     plan = lb.toa(ANCHORS, std, prior=prior)
     support, law = support_of(prior, plan.anchors), pair_law(plan)
     points = by_hand.grid(inside, low, high, 0.04)
-    slow = by_hand.weiss_weinstein(points, 0.04, inside, means, H)
+    slow = by_hand.weiss_weinstein(points, 0.04, inside, affinity, H)
     np.testing.assert_allclose(bound_matrices(H, grams(support, law, [H], 12, [1.0])[0])[0], slow, rtol=GRID, atol=2e-3)
     a = np.array([0.6, 0.8])
     points = by_hand.grid(inside, low, high, 0.08)
-    slow = by_hand.ziv_zakai(points, 0.08, inside, means, a, 14.0, cells=150)
+    slow = by_hand.ziv_zakai(points, inside, error, a, 14.0, cells=150)
     quick = along(support, law, a, 12, [1.0], rtol=1e-3).mse_m2[0]
     assert quick == pytest.approx(slow, rel=4 * GRID)
 
@@ -91,6 +91,15 @@ def test_least_error_of_a_line():
     assert abs(quick.position_rmse.values[0] / np.sqrt(slow) - 1) < 4 * quick.relative_stderr() + 1e-3
     for bound in (lb.wwb(plan), lb.ezzb(plan)):
         assert bound.position_mse[0] < slow
+
+
+@pytest.mark.parametrize("std", [0.8, 4.0])
+def test_least_error_of_two_ranges(std):
+    slow = by_hand.least_error_of_two_ranges(
+        by_hand.grid(in_disc, [-6, -6], [6, 6], 0.2), ANCHORS[:2], std, min(0.25, std / 4)
+    )
+    quick = lb.mmse(lb.toa(ANCHORS[:2], std, prior=AREAS["disc"][0]), rtol=2e-3)
+    assert abs(quick.position_mse[0] / slow - 1) < 8 * quick.relative_stderr() + GRID
 
 
 @pytest.mark.parametrize("std", [0.1, 0.5, 1.8, 2.5])

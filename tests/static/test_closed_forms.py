@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.special import gammainc
+from scipy.stats import norm
 
+import locbounds as lb
 from locbounds.static import support as supports
 from locbounds.static.overlap import Rule, legendre
 from locbounds.static.pair_laws import GaussianPairs, gaussian_error
@@ -11,6 +14,7 @@ from locbounds.static.weiss_weinstein_search import equal_lengths
 from locbounds.static.ziv_zakai_kernel import along
 
 EXACT = 1e-6
+TABULATED = 1e-4  # coefficients of noises between the nodes of their tables
 NOTHING = GaussianPairs.of(lambda p: np.zeros((len(p), 1)), np.eye(1))
 X = np.array([1.0])
 
@@ -53,6 +57,38 @@ def test_linear_gaussian(H):
 def test_short_test_vectors_give_the_inverse_information():
     support, law, J = linear()
     np.testing.assert_allclose(wwb_of(support, law, 1e-3 * np.eye(2)), np.linalg.inv(J), rtol=EXACT)
+
+
+@pytest.mark.parametrize("std", [0.05, 0.7, 20.0])
+def test_ziv_zakai_of_a_uniform_law_and_gaussian_noise(std):
+    """Bell et al. 1997: ``int h (1 - h/L) Q(h / 2 std) dh`` in incomplete gamma functions."""
+    L = 3.0
+    a = L**2 / (8 * std**2)
+    expected = (
+        L**2 / 6 * norm.sf(L / (2 * std))
+        + std**2 * gammainc(1.5, a)
+        - 16 * std**3 / (3 * L * np.sqrt(2 * np.pi)) * gammainc(2.0, a)
+    )
+    law = GaussianPairs.of(lambda p: p, std**2 * np.eye(1))
+    assert along(supports.box([1.0], [1.0 + L]), law, X, 4, [1.0], rtol=1e-7).mse_m2[0] == pytest.approx(
+        expected, rel=EXACT
+    )
+
+
+def test_noise_that_is_not_gaussian():
+    """Laplace noise of scale b: error ``exp(-d / 2b) / 2``, Bhattacharyya coefficient ``(1 + d / 2b) exp(-d / 2b)``."""
+    L, b, h = 3.0, 0.4, 0.7
+    plan = lb.observe(lambda p: p[0], [lb.Laplace(0.0, b)], dim=1, prior=lb.UniformBox([0.0], [L]))
+    c = 2 * b
+    x = L / c
+    integral = c**2 * (1 - np.exp(-x) * (1 + x)) - c**3 / L * (2 - np.exp(-x) * (2 + 2 * x + x**2))
+    assert lb.ezzb(plan, rtol=1e-4).position_mse[0] == pytest.approx(0.5 * integral, rel=TABULATED)
+
+    def rho(d):
+        return (1 + d / c) * np.exp(-d / c)
+
+    mu, q = (1 - h / L) * rho(h), 2 * (1 - h / L) - 2 * (1 - 2 * h / L) * rho(2 * h)
+    assert lb.wwb(plan, tests=np.array([[h]])).position_mse[0] == pytest.approx(h**2 * mu**2 / q, rel=TABULATED)
 
 
 @pytest.mark.parametrize("ratio", [0.1, 1.0, 10.0])

@@ -13,6 +13,7 @@ import numpy as np
 
 from locbounds.axes import Array, Float
 from locbounds.noise import Noise, bhattacharyya, minimum_error
+from locbounds.precision import traced
 
 WRAPS_FROM_RAD = 0.2  # below this deviation both ways round the circle never meet: exp(-pi^2 / (8 std^2)) < 1e-13
 ON_CIRCLE = 1024  # nodes on the circle; exact to rounding for smooth densities
@@ -29,11 +30,11 @@ class Table(NamedTuple):
 
     def look_up(self, values: np.ndarray, d: Float[Array, "*n"]) -> Float[Array, "*n"]:
         """Monotone cubic interpolation at shifts d, even in d; the last value beyond the reach."""
-        y, slope = values
-        t = jnp.sqrt(jnp.minimum(jnp.abs(d) / self.reach, 1.0)) * (len(y) - 1)
-        i = jnp.clip(t.astype(int), 0, len(y) - 2)
+        xp = jnp if traced(d) else np
+        y, slope = (xp.asarray(v) for v in values)
+        t = xp.sqrt(xp.minimum(xp.abs(d) / self.reach, 1.0)) * (len(y) - 1)
+        i = xp.clip(t.astype(int), 0, len(y) - 2)
         u = t - i
-        y, slope = jnp.asarray(y), jnp.asarray(slope)
         a, b, c, e = y[i], y[i + 1], slope[i], slope[i + 1]
         return a + u * (c + u * (3 * (b - a) - 2 * c - e + u * (2 * (a - b) + c + e)))
 
@@ -74,7 +75,8 @@ def _reach(noise: Noise) -> float:
     places = np.asarray(noise.landmarks())
     reach = float(places[-1] - places[0])
     shifts = reach * 0.5 ** np.arange(10)
-    small = np.asarray(bhattacharyya(noise, shifts)) < NEGLIGIBLE
+    padded = np.concatenate([shifts, np.zeros(SHIFTS - len(shifts))])  # the table's shape: compiled once
+    small = np.asarray(bhattacharyya(noise, padded))[: len(shifts)] < NEGLIGIBLE
     return float(shifts[np.flatnonzero(small)[-1]]) if small[0] else reach
 
 
@@ -112,4 +114,5 @@ def wrap(difference: Any) -> Any:
     >>> float(wrap(jnp.array(3 * np.pi / 2)) / np.pi)
     -0.5
     """
-    return difference - 2 * np.pi * jnp.floor(difference / (2 * np.pi) + 0.5)
+    xp = jnp if traced(difference) else np
+    return difference - 2 * np.pi * xp.floor(difference / (2 * np.pi) + 0.5)

@@ -310,7 +310,7 @@ class Plan(eqx.Module):
     ) -> Float[Array, "points channels"]:
         """Differences of the noise-free values at two places each, angles wrapped."""
         d = self.means(a) - self.means(b)
-        return jnp.where(self.periodic, wrap(d), d)
+        return (jnp if traced(d) else np).where(self.periodic, wrap(d), d)
 
     @double_precision
     def log_bhattacharyya(
@@ -324,14 +324,14 @@ class Plan(eqx.Module):
 
     def log_rho(self, d: Float[Array, "*points channels"]) -> Float[Array, "*points"]:
         """The same, of given differences of noise-free values."""
-        mine = self.gaussian
-        log = -self._squares(d[..., mine]) / 8
+        xp = jnp if traced(d) else np
+        log = -self._squares(d[..., self.gaussian]) / 8
         for c, its in self.tables:
-            log = log + jnp.log(jnp.maximum(its.rho(d[..., c]), 1e-300))
+            log = log + xp.log(xp.maximum(its.rho(d[..., c]), 1e-300))
         return log
 
     def _squares(self, d: Array) -> Array:
-        return jnp.einsum("...i,ij,...j->...", d, self.precision, d)
+        return (jnp if traced(d) else np).einsum("...i,ij,...j->...", d, self.precision, d)
 
     @property
     def minimum_error_exact(self) -> bool:
@@ -344,27 +344,36 @@ class Plan(eqx.Module):
     ) -> Float[Array, " points"]:
         """Smallest probability of error in deciding between two equally probable places each.
 
-        Exact for Gaussian channels, ``Q(|m(a) - m(b)| / 2)``, and for a single other channel. Otherwise the larger of
-        two valid lower bounds: ``(1 - sqrt(1 - rho^2)) / 2``, and, if all noises are Gaussian and only angles are wide,
-        the error of their unwrapped differences.
+        Exact for Gaussian channels, ``Q(|m(a) - m(b)| / 2)``, and for a single other channel. Otherwise the largest of
+        valid lower bounds: ``(1 - sqrt(1 - rho^2)) / 2``; half the product of the channels' ``2 P`` (the minimum of
+        two products is not below the product of the minima); and, if all noises are Gaussian and only angles are
+        wide, the error of their unwrapped differences.
         """
         return self.p_min(self.differences(a, b))
 
     def p_min(self, d: Float[Array, "*points channels"]) -> Float[Array, "*points"]:
         """The same, of given differences of noise-free values."""
-        from jax.scipy.special import erfc
+        xp: Any = jnp if traced(d) else np
+        if xp is np:
+            from scipy.special import erfc
+        else:
+            from jax.scipy.special import erfc
 
         if not self.tables:
-            return 0.5 * erfc(jnp.sqrt(self._squares(d)) / np.sqrt(8.0))
+            return 0.5 * erfc(xp.sqrt(self._squares(d)) / np.sqrt(8.0))
         if self.minimum_error_exact:
             c, its = self.tables[0]
             return its.p_min(d[..., c])
-        rho = jnp.exp(self.log_rho(d))
-        bound = 0.5 * rho**2 / (1 + jnp.sqrt(jnp.maximum(1 - rho**2, 0.0)))
+        rho = xp.exp(self.log_rho(d))
+        bound = 0.5 * rho**2 / (1 + xp.sqrt(xp.maximum(1 - rho**2, 0.0)))
+        product = 0.5 * erfc(xp.sqrt(self._squares(d[..., self.gaussian])) / np.sqrt(8.0))
+        for c, its in self.tables:
+            product = product * 2 * its.p_min(d[..., c])
+        bound = xp.maximum(bound, product)
         if all(group.noises is None or all(type(n) is Gaussian for n in group.noises) for group in self.groups):
             square = self._squares(d[..., self.gaussian])
             square = square + sum((d[..., c] / self.stds[c]) ** 2 for c, _ in self.tables)
-            bound = jnp.maximum(bound, 0.5 * erfc(jnp.sqrt(square) / np.sqrt(8.0)))
+            bound = xp.maximum(bound, 0.5 * erfc(xp.sqrt(square) / np.sqrt(8.0)))
         return bound
 
     def dangers(self) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ REPLICATES = 16
 RUNS = 128  # per replicate at first
 MOST_RUNS = 2048
 TRIAL = 256  # draws on which the nodes are chosen
-NODES, MOST_NODES = 24, 420  # along a line
+NODES, MOST_NODES = 16, 420  # along a line
 TABLE = 2**22  # numbers in one table of likelihoods
 FACE = 24  # draws that share the nodes which matter to any of them
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
 
 from locbounds.axes import Array, Float, ndarray
 from locbounds.errors import InputError
 from locbounds.plan import Plan
-from locbounds.priors import GaussianPrior, PositionPrior, UniformBox, UniformDisc, UniformPolygon
+from locbounds.priors import GaussianPrior, PositionPrior, PriorMixture, UniformBox, UniformDisc, UniformPolygon
 from locbounds.static import support as supports
 from locbounds.static.overlap import polygon_overlap, shared_nodes
 from locbounds.static.pair_laws import GaussianPairs, PairLaw, Tabulated
@@ -87,6 +88,16 @@ def needs_prior(plan: Plan, name: str) -> PositionPrior:
     return plan.prior
 
 
+def _log_density(prior: PositionPrior) -> Callable[[ndarray], ndarray]:
+    """A density that is asked for very often, as plain NumPy where it is Gaussian or a mixture."""
+    if isinstance(prior, GaussianPrior):
+        return supports.gaussian(np.asarray(prior.mean), np.asarray(prior.covariance)).log_density
+    if isinstance(prior, PriorMixture):
+        weights, parts = np.log(np.asarray(prior.weights)), [_log_density(part) for part in prior.parts]
+        return lambda points: np.logaddexp.reduce([w + part(points) for w, part in zip(weights, parts, strict=True)])
+    return lambda points: np.asarray(prior.log_density(points))
+
+
 def support_of(prior: PositionPrior, marks: Array | None = None) -> Support:
     """Density and overlaps of a prior; ``marks`` are the anchors, at which integrands are rough."""
     marks = supports.NO_MARKS if marks is None or not len(marks) else np.asarray(marks, float)
@@ -111,8 +122,7 @@ def support_of(prior: PositionPrior, marks: Array | None = None) -> Support:
             covariance,
         )
 
-    def log_density(points: ndarray) -> ndarray:
-        return np.asarray(prior.log_density(points))
+    log_density = _log_density(prior)
 
     @functools.cache
     def nodes(n: int) -> tuple[ndarray, ndarray]:
