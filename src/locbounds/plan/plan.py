@@ -224,7 +224,7 @@ class Plan(eqx.Module):
                 blocks.append(jnp.linalg.inv(group.covariance) if traced(group) else np.linalg.inv(group.covariance))
                 continue
             each = [
-                _accuracy(noise, periodic, name)
+                _accuracy(noise, bool(periodic), name)
                 for noise, periodic, name in zip(group.noises or (), self.periodic[here], names, strict=True)
             ]
             blocks.append(jnp.diag(jnp.stack(each)) if traced(each) else np.diag(np.array(each, dtype=float)))

@@ -211,7 +211,7 @@ def observe(
     return Plan([Observations([measurement], matrix, noises)], **plan)  # pyright: ignore[reportArgumentType]
 
 
-def _positions(anchors: Any) -> np.ndarray:
+def _positions(anchors: Any) -> Any:
     places = float64(anchors)
     if places.ndim != 2 or places.shape[1] not in (2, 3) or len(places) == 0:
         raise InputError(

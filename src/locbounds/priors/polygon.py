@@ -19,6 +19,8 @@ def outline(corners: Any, name: str = "the outline") -> Float[Array, "corners 2"
     [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
     """
     ring = np.asarray(corners, dtype=np.float64)
+    if ring.size == 0:
+        raise InputError(f"{name} has no corners", "Give at least three, [[x, y], ...] in metres")
     if ring.ndim != 2 or ring.shape[1] != 2 or not np.all(np.isfinite(ring)):
         raise InputError(f"{name} has the shape {ring.shape}", "Give corners [[x, y], ...] in metres, finite numbers")
     if len(ring) > 1 and np.array_equal(ring[0], ring[-1]):

@@ -29,7 +29,9 @@ from locbounds.verdict import Status, Verdict
 
 CHUNK = 1 << 16  # points at once: memory stays bounded, one compilation for all chunks
 SINGULAR = 1e-9  # what remains of a derivative beside the others, relative to it, below which geometry is singular
+LARGE, BLOCK = 1 << 19, 1 << 16  # numbers in an array [channels, points]: from when it is cut, and into what
 AT_ANCHOR_M = 1e-9
+MANY = 16  # channels from which a common part of their noise is worth a look
 REASONS = {
     0: "",
     1: "the measurements do not determine the position here",
@@ -268,22 +270,62 @@ def _bounds(plan: Plan, points: Array, verdict: Verdict | None, provenance: Prov
 
 
 def _whitener(plan: Plan) -> tuple[Any, Any, Any]:
-    """L^T of ``W = L L^T`` (its diagonal if there is nothing else), the rounding of its columns, the clock's column."""
+    """L^T of ``W = L L^T`` (its diagonal if there is nothing else), the rounding of its columns, the clock's column.
+
+    Many channels whose noise shares one common part (differences to one reference) are taken as independent ones with
+    an offset of that deviation in common, which is the same and costs as many operations as there are channels.
+    """
     W = plan.accuracy_with_clock
+    shared = None if traced(W) or plan.size < MANY else _shared_part(plan)
+    if shared is not None:
+        own, column, std = shared
+        root = 1 / own
+        floor = np.sqrt(np.sum(np.where(_cancelling(plan), root**2, 0.0)))
+        return root, floor, (column * root, 1.0 / std)
     xp = jnp if traced(W) else np
     diagonal = not traced(W) and np.count_nonzero(W - np.diag(np.diagonal(W))) == 0
     root = xp.sqrt(xp.diagonal(W)) if diagonal else xp.linalg.cholesky(W).T
-    cancels = np.array([m.cancels for group in plan.groups for m in group.per_channel])
-    floor = xp.sqrt(xp.sum(xp.where(cancels, xp.diagonal(W), 0.0)))
+    floor = xp.sqrt(xp.sum(xp.where(_cancelling(plan), xp.diagonal(W), 0.0)))
     if plan.clock_std_m is None:
         return root, floor, None
     column = plan.clocked * root if diagonal else root @ plan.clocked.astype(float)
     return root, floor, (column, 1.0 / xp.asarray(plan.clock_std_m))
 
 
+def _cancelling(plan: Plan) -> np.ndarray:
+    return np.array([m.cancels for group in plan.groups for m in group.per_channel])
+
+
+def _shared_part(plan: Plan) -> tuple[Any, Any, float] | None:
+    """Own deviations [channels], who has the common part [channels], its deviation; None if there is no such form."""
+    groups = [g for g in plan.groups if g.covariance is not None]
+    correlated = [g for g in groups if np.count_nonzero(g.covariance - np.diag(np.diagonal(g.covariance)))]
+    if plan.clock_std_m is not None or len(correlated) != 1:
+        return None
+    C = np.asarray(correlated[0].covariance)
+    common = float(C[0, 1])
+    own = np.diagonal(C) - common
+    if not common > 0 or np.any(own <= 1e-3 * common) or not np.allclose(C, np.diag(own) + common, rtol=1e-12, atol=0):
+        return None
+    variances = 1 / np.diagonal(plan.accuracy_with_clock)
+    here = np.concatenate([np.full(g.size, g is correlated[0]) for g in plan.groups])
+    variances[here] = own
+    return np.sqrt(variances), here.astype(float), np.sqrt(common)
+
+
 @partial(jax.jit, static_argnums=1)
 def _kernel(parts: list, counts: tuple[int, ...], order: Any, root: Any, floor: Any, clock: Any, points: Any) -> tuple:
-    """Covariance [n, d, d], status [n], variance of the clock [n]."""
+    """Covariance [n, d, d], status [n], variance of the clock [n]; in blocks whose arrays stay in the cache."""
+    one = partial(_block, parts, counts, order, root, floor, clock)
+    n, block = len(points), max(BLOCK // len(order), 256)
+    if n * len(order) <= LARGE:
+        return one(points)
+    padded = jnp.pad(jnp.asarray(points), ((0, -n % block), (0, 0)), mode="edge")
+    found = jax.lax.map(one, padded.reshape(-1, block, padded.shape[1]))
+    return jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:])[:n], found)
+
+
+def _block(parts: list, counts: tuple[int, ...], order: Any, root: Any, floor: Any, clock: Any, points: Any) -> tuple:
     x = jnp.asarray(points).T  # columns [channels, n]: long axes last
     d = len(x)
     H = _slopes(parts, counts, order, x)

@@ -175,7 +175,7 @@ class Ellipse(NamedTuple):
     def angle_rad(self) -> np.ndarray:
         """Angle of the longest axis from the x-axis, in (-pi/2, pi/2]; 2-D."""
         x, y = self.directions[..., 0, 0], self.directions[..., 1, 0]
-        return np.arctan2(np.where(x < 0, -y, y), np.abs(x))
+        return np.asarray(np.arctan2(np.where(x < 0, -y, y), np.abs(x)))
 
 
 def error_ellipse(covariance: Float[Array, "*n space space"], share: float = 0.95) -> Ellipse:
