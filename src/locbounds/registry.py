@@ -428,6 +428,7 @@ def describe(entry: Method) -> dict[str, Any]:
         "summary": entry.summary,
         "sees": sorted(entry.sees),
         "assumes": [*entry.conditions, *entry.grounds, *(a.text for a in entry.assumptions)],
+        "on_plan": [a.text for a in entry.on_plan],
         "fails": entry.fails,
         "cite": list(entry.references),
     }
@@ -459,8 +460,10 @@ def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
     if id in TOPICS:
         return TOPICS[id]
     entry = describe(method(id))
-    lines = [f"{entry['name']} ({entry['id']}), a {entry['kind']}", entry["summary"], ""]
+    article = "an" if entry["kind"][0] in "aeiou" else "a"
+    lines = [f"{entry['name']} ({entry['id']}), {article} {entry['kind']}", entry["summary"], ""]
     lines += [f"sees     {', '.join(entry['sees'])}", *(f"assumes  {text}" for text in entry["assumes"])]
+    lines += [f"assumes  of a plan (one position): {text}" for text in entry["on_plan"]]
     lines += [f"careful  {entry['fails']}", f"cite     {', '.join(entry['cite'])}"]
     if scenario is not None:
         lines += ["", f"for      {scenario.title or 'this scenario'}"]

@@ -181,3 +181,4 @@ def test_all_figures_through_the_shell(tmp_path, monkeypatch):
     assert len({(r["case"], r["sigma"]) for r in rows}) == 54
     check(rows)
     assert "Fig. 9 needs measured surveys" in done.output
+    assert "maximum likelihood, which uses no prior\n  does not hold" in done.output

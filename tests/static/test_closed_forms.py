@@ -100,7 +100,7 @@ def test_ziv_zakai_is_the_least_error_of_a_scalar_gaussian(ratio):
 
 
 def test_a_free_shift_makes_it_exact_for_a_correlated_gaussian():
-    """The best shift minimises ``d^T J d`` for ``a . d = h`` and gives ``a^T J^-1 a``; along a it is ``1 / a^T J a``."""
+    """The best shift minimises ``d^T J d`` for ``a . d = h``: ``a^T J^-1 a``; along a it is ``1 / a^T J a``."""
     support, law, J = linear()
     a = np.array([1.0, 0.0])
     straight = along(support, law, a, 16, [1.0], rtol=1e-4).mse_m2[0]

@@ -30,7 +30,10 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
             folder.write_text("fig9.csv", study.fig9_csv(surveys))
             figure = study.fig9_figure(surveys)
             folder.write("fig9.png", lambda path: figure.savefig(path, dpi=150))
-    said = study.statements(found)
+        said = study.statements(found)
+        if "fig3" in found:
+            say("Fig. 3: maximum likelihood")
+            said.insert(2, study.on_maximum_likelihood(seed=seed))
     if json:
         print_json(
             {name: [row._asdict() for row in rows] for name, rows in found.items()}
@@ -54,8 +57,9 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
         typer.echo(f"- {s.paper}\n  {s.verdict}: {s.why}")
     if found:
         typer.echo(
-            "\nCRLB and BCRB are no bounds here: the prior ends at the rim, and estimators that know it are biased. "
-            "They are the mean\nof the local bound and the inverse of the mean information; zero for RSS and AoA.\n"
+            "\nCRLB and BCRB are no bounds here: the prior ends at the rim, and estimators that know it are biased. They "
+            "are the mean\nof the local bound (infinite for TDoA with stations inside) and the inverse of the mean "
+            "information (zero for RSS and AoA).\n"
         )
     if surveys:
         _print_fig9(surveys)

@@ -14,7 +14,7 @@ import numpy as np
 
 from locbounds.axes import Float, ndarray
 
-FINE = np.linspace(0.0, 0.5, 2**14 + 1)  # differences between which the coefficient of a wrapped law is linear
+CELLS = 2**14  # of half a period, between which the coefficient of a wrapped law is linear
 TABLE = 513  # differences at which the coefficient of a wrapped normal law is tabulated
 WAVES = 0.3  # deviation over period above which a wrapped density is a short Fourier series
 NARROW = 0.02  # deviation over period below which no table is needed
@@ -164,12 +164,15 @@ def wrapped_log_affinity(difference: ndarray, std: float, period: float = 2 * np
     if std < NARROW * period:  # mass around the middles of both arcs between the centres, nothing elsewhere
         near, far = np.abs(difference), period - np.abs(difference)
         return np.logaddexp(-(near**2) / (8 * std**2), -(far**2) / (8 * std**2))
-    return np.interp(np.abs(difference), period * FINE, _wrapped_table(std / period))
+    values = _wrapped_table(std / period)
+    at = np.abs(difference) * (2 * CELLS / period)
+    cell = np.minimum(at.astype(np.int64), CELLS - 1)
+    return values[cell] + (at - cell) * (values[cell + 1] - values[cell])
 
 
 @functools.lru_cache(maxsize=128)
 def _wrapped_table(std: float) -> ndarray:
-    """The coefficient for a period of one, at :data:`FINE`."""
+    """The coefficient for a period of one, at :data:`CELLS` equal steps over half of it."""
     from scipy.interpolate import CubicSpline
     from scipy.special import logsumexp
 
@@ -184,4 +187,4 @@ def _wrapped_table(std: float) -> ndarray:
         return logsumexp(-0.5 * ((at[..., None] + copies) / std) ** 2, axis=-1) - np.log(std * np.sqrt(2 * np.pi))
 
     total = 0.5 * (log_density(x) + log_density(x - grid[:, None]))
-    return CubicSpline(grid, logsumexp(total, axis=1) - np.log(512))(FINE)
+    return CubicSpline(grid, logsumexp(total, axis=1) - np.log(512))(np.linspace(0.0, 0.5, CELLS + 1))

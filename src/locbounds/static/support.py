@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import functools
+from collections import OrderedDict
 from collections.abc import Callable
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,8 +18,45 @@ from locbounds.static.overlap import (
     gaussian_overlap,
 )
 
-KEPT = 4096  # rules of discs kept in memory: some 20 kB each
 REACH = 16.0  # deviations: two Gaussians so far apart have exp(-32) in common
+
+
+class Kept:
+    """Rules kept in memory, the least recently used ones dropped beyond so many bytes.
+
+    Rules depend on the prior and the anchors' places, not on what is measured: plans and noise levels share them.
+
+    >>> kept = Kept(most_bytes=100.0)
+    >>> rules = [kept(n, lambda: Rule(np.zeros((n, 2)), np.zeros(n))) for n in (1, 2, 1, 4)]
+    >>> rules[0] is rules[2], kept.bytes
+    (True, 96)
+    """
+
+    def __init__(self, most_bytes: float):
+        self.most_bytes, self.bytes = most_bytes, 0
+        self.rules: OrderedDict[Any, Rule] = OrderedDict()
+        self.lock = Lock()
+
+    def __call__(self, key: Any, make: Callable[[], Rule]) -> Rule:
+        with self.lock:
+            if key in self.rules:
+                self.rules.move_to_end(key)
+                return self.rules[key]
+        rule = make()
+        with self.lock:
+            self.bytes -= _size(self.rules.pop(key, None))
+            self.rules[key] = rule
+            self.bytes += _size(rule)
+            while self.bytes > self.most_bytes:
+                self.bytes -= _size(self.rules.popitem(last=False)[1])
+        return rule
+
+
+def _size(rule: Rule | None) -> int:
+    return 0 if rule is None else rule.points.nbytes + rule.weights.nbytes
+
+
+_kept = Kept(most_bytes=1.5e8)
 
 
 class Support(NamedTuple):
@@ -55,25 +93,30 @@ def disc(centre: Any, radius: float, marks: ndarray = NO_MARKS) -> Support:
     """Uniform on a disc."""
     centre, radius = np.asarray(centre, float), float(radius)
     level = -np.log(np.pi * radius**2)
-    where = (centre.tobytes(), radius, np.asarray(marks, float).tobytes())
+    marks = np.asarray(marks, float)
+
+    def overlap(shifts: ndarray, n: int, rough: ndarray | None = None) -> Rule:
+        shifts = np.asarray(shifts, float)
+        rough = None if rough is None else np.asarray(rough, float)
+        key = (
+            centre.tobytes(),
+            radius,
+            marks.tobytes(),
+            shifts.tobytes(),
+            n,
+            None if rough is None else rough.tobytes(),
+        )
+        return _kept(key, lambda: disc_overlap(centre, radius, shifts, n, marks, rough))
+
     return Support(
         2,
         lambda points: np.full(len(points), level),
-        lambda shifts, n, rough=None: _disc_rule(
-            *where, np.asarray(shifts, float).tobytes(), n, b"" if rough is None else np.asarray(rough, float).tobytes()
-        ),
+        overlap,
         lambda a: 2 * radius,
         True,
         False,
         np.eye(2) * radius**2 / 4,
     )
-
-
-@functools.lru_cache(maxsize=KEPT)
-def _disc_rule(centre: bytes, radius: float, marks: bytes, shifts: bytes, n: int, rough: bytes) -> Rule:
-    """Rules depend on the prior and the anchors' places, not on what is measured: plans and noise levels share them."""
-    c, m, u, r = (np.frombuffer(b).reshape(-1, 2) for b in (centre, marks, shifts, rough))
-    return disc_overlap(c[0], radius, u, n, m, r if len(r) else None)
 
 
 def box(low: Any, high: Any, marks: ndarray = NO_MARKS) -> Support:

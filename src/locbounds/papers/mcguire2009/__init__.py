@@ -13,7 +13,7 @@ from locbounds.papers.mcguire2009.simple import (
     simple_figure,
     simple_study,
 )
-from locbounds.papers.mcguire2009.statements import Statement, statements
+from locbounds.papers.mcguire2009.statements import Statement, on_maximum_likelihood, statements
 from locbounds.papers.mcguire2009.survey_set import (
     DATA,
     PUBLISHED_FIG9,
@@ -48,6 +48,7 @@ __all__ = [
     "fig9_csv",
     "fig9_figure",
     "figure_csv",
+    "on_maximum_likelihood",
     "simple_figure",
     "simple_study",
     "statements",

@@ -227,9 +227,9 @@ def simple_figure(rows: Iterable[Row]) -> Figure:
     figure = Figure(figsize=(5.0 * len(names), 4.9), layout="constrained")
     panels = figure.subplots(1, len(names), squeeze=False, sharey=True)[0]
     top = 1.6 * max(row.rmse_m for row in rows if row.method == "MMSE")
-    low = 0.6 * min(row.rmse_m for row in rows if row.valid == VALID)
+    low = 0.8 * min(row.rmse_m for row in rows if row.valid == VALID)
     for axes, name in zip(panels, names, strict=True):
-        case = next(c for c in CASES if c.name == name)
+        case, absent = next(c for c in CASES if c.name == name), []
         for method in METHODS:
             line = [(r.sigma, r.rmse_m, r.stderr_m) for r in rows if (r.case, r.method) == (name, method)]
             x, y, error = np.array(line).T
@@ -237,12 +237,14 @@ def simple_figure(rows: Iterable[Row]) -> Figure:
             label = LABELS.get(method, method)
             if not seen.any():
                 axes.plot([], [], label=label, ms=4, **STYLE[method])
+                absent.append(f"{label.partition(' (')[0]}: {'zero' if np.all(y == 0) else 'infinite'}")
             elif method == "MMSE":
                 axes.errorbar(x, y, 2 * error, label=label, ms=4, **STYLE[method])
             else:
                 axes.plot(x[seen], y[seen], label=label, ms=4, **STYLE[method])
         axes.set(xscale="log", yscale="log", xlabel=f"standard deviation of the noise in {case.unit}", ylim=(low, top))
         axes.set_title(name, loc="left", fontsize="medium")
+        axes.text(0.97, 0.04, "\n".join(absent), transform=axes.transAxes, ha="right", fontsize="small", color="0.35")
         axes.set_xticks(case.sigmas, [f"{s:g}" for s in case.sigmas], minor=False)
         axes.set_xticks([], minor=True)
         ticks = [t for t in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20) if low < t < top]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from locbounds.papers.mcguire2009.simple import Row
+from locbounds.papers.mcguire2009.simple import CASES, Row, inverse_expected_information
 
 HOLDS, PARTLY, FAILS = "holds", "holds in part", "does not hold"
 
@@ -60,6 +60,29 @@ def statements(found: Mapping[str, Iterable[Row]]) -> list[Statement]:
                 )
             )
     return said
+
+
+def on_maximum_likelihood(*, seed: int = 0) -> Statement:
+    """Whether the inverse expected information bounds maximum likelihood in Fig. 3, at its highest noise level.
+
+    The chapter says so of estimators that do not use the prior. With equal deviations least squares is maximum
+    likelihood; it is searched in the disc, and in a box three times as wide.
+    """
+    from locbounds.static.estimators import ls, ml
+
+    case = CASES[0]
+    sigma = case.sigmas[-1]
+    claimed = sigma * inverse_expected_information(case)
+    inside, wide = (f(case.plan(sigma), seed=seed) for f in (ml, ls))
+    errors = [(float(r.mean_position_rmse()), r.mean_position_rmse_stderr()) for r in (inside, wide)]
+    below = [value + 4 * error < claimed for value, error in errors]
+    texts = [f"{value:.2f} ± {error:.2f} m" for value, error in errors]
+    return Statement(
+        "Fig. 3: the inverse expected information is a lower bound for maximum likelihood, which uses no prior",
+        FAILS if all(below) else PARTLY if any(below) else HOLDS,
+        f"at {sigma:g} m it is {claimed:.2f} m, the error of maximum likelihood {texts[0]} if searched in the disc, "
+        f"{texts[1]} in a box three times as wide: at high noise the estimate is biased",
+    )
 
 
 def _order(case: dict[str, dict[float, float]], text: str) -> Statement:
