@@ -15,6 +15,7 @@ from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
 from .filters import EkfBanks, Estimates, FactorisedImmEkf, ImmEkf, ImmKf, ImmKfSmoother, OracleEkf, Rbpf
 from .fit.scenario import fit_scenario
+from .io.footprints import read_city
 from .io.logs import read_log
 from .io.scenario_file import load, save
 from .io.surveys import read_survey
@@ -41,6 +42,7 @@ from .noise import (
     minimum_error,
 )
 from .priors import DensityPrior, GaussianPrior
+from .propagation import Building, City, Links, street_links
 from .reference import reference
 from .registry import explain
 from .report import plot
@@ -57,7 +59,9 @@ __version__: str
 __all__ = [
     "AdditiveChannel",
     "AlongTrack",
+    "Building",
     "BySight",
+    "City",
     "ConstantAcceleration",
     "ConstantVelocity",
     "CoordinatedTurn",
@@ -89,6 +93,7 @@ __all__ = [
     "Laplace",
     "LinearMotion",
     "Link",
+    "Links",
     "LocboundsError",
     "LogNormal",
     "MarkovSight",
@@ -127,12 +132,14 @@ __all__ = [
     "papers",
     "plot",
     "quantile",
+    "read_city",
     "read_log",
     "read_survey",
     "reference",
     "save",
     "score",
     "simulate",
+    "street_links",
     "survey_bound",
     "survey_model",
     "testing",
