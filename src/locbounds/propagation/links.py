@@ -276,6 +276,7 @@ def _around_corners(
     blocked = ~direct[:, part]
     best, via = length[:, part], last[:, part]
     for k, index, leg in graph.seen(points):
+        index, leg = index[leg > 0], leg[leg > 0]
         if not len(index) or not np.isfinite(tree[:, k]).any():
             continue
         total = tree[:, k, None] + leg
