@@ -19,7 +19,7 @@ from .io.footprints import read_city
 from .io.logs import read_log
 from .io.scenario_file import load, save
 from .io.surveys import read_survey
-from .measurement import BySight, Range
+from .measurement import Bearing, BySight, Elevation, Function, PathLoss, Range, RangeDifference
 from .model import AdditiveChannel, DensityChannel, DensityMotion, JumpMarkov, jump_markov
 from .motion import ConstantAcceleration, ConstantVelocity, CoordinatedTurn, LinearMotion, RandomWalk, SwitchingMotion
 from .noise import (
@@ -41,7 +41,8 @@ from .noise import (
     bhattacharyya,
     minimum_error,
 )
-from .priors import DensityPrior, GaussianPrior
+from .plan import Observations, Plan, aoa, observe, rss, tdoa, toa
+from .priors import DensityPrior, GaussianPrior, PriorMixture, UniformBox, UniformDisc, UniformPolygon
 from .propagation import Building, City, Links, street_links
 from .reference import reference
 from .registry import explain
@@ -59,6 +60,7 @@ __version__: str
 __all__ = [
     "AdditiveChannel",
     "AlongTrack",
+    "Bearing",
     "Building",
     "BySight",
     "City",
@@ -71,6 +73,7 @@ __all__ = [
     "Draws",
     "DwellSight",
     "EkfBanks",
+    "Elevation",
     "Epoch",
     "Estimates",
     "Exponential",
@@ -79,6 +82,7 @@ __all__ = [
     "Fingerprints",
     "FromLogDensity",
     "FromNumPyro",
+    "Function",
     "Gamma",
     "Gaussian",
     "GaussianMixture",
@@ -98,11 +102,16 @@ __all__ = [
     "LogNormal",
     "MarkovSight",
     "Mixture",
+    "Observations",
     "OracleEkf",
+    "PathLoss",
+    "Plan",
     "PrecisionError",
     "Prior",
+    "PriorMixture",
     "RandomWalk",
     "Range",
+    "RangeDifference",
     "Rbpf",
     "RefusedError",
     "Result",
@@ -114,6 +123,10 @@ __all__ = [
     "Times",
     "TruncatedGaussian",
     "Uniform",
+    "UniformBox",
+    "UniformDisc",
+    "UniformPolygon",
+    "aoa",
     "bcrb",
     "bcrb_algorithm1",
     "bcrb_block_tridiagonal",
@@ -129,6 +142,7 @@ __all__ = [
     "load",
     "los_only",
     "minimum_error",
+    "observe",
     "papers",
     "plot",
     "quantile",
@@ -136,12 +150,15 @@ __all__ = [
     "read_log",
     "read_survey",
     "reference",
+    "rss",
     "save",
     "score",
     "simulate",
     "street_links",
     "survey_bound",
     "survey_model",
+    "tdoa",
     "testing",
     "tightest",
+    "toa",
 ]

@@ -8,6 +8,9 @@ axis           meaning
 ``state``      components of the mobile's state, positions first
 ``space``      2 or 3 position coordinates
 ``links``      anchors, in the scenario's order
+``points``     positions at which something is evaluated
+``channels``   measured numbers of a static plan
+``nodes``      nodes of a quadrature
 ``modes``      sight conditions of one link: 0 = LOS, 1 = NLOS
 ``components`` components of a Gaussian mixture
 ``samples``    Monte Carlo draws

@@ -16,6 +16,7 @@ from locbounds.noise import Noise
 from locbounds.precision import traced
 from locbounds.priors import GaussianPrior
 from locbounds.sight import KnownSight, Sight
+from locbounds.stacks import stacks
 from locbounds.times import Times
 
 
@@ -73,16 +74,7 @@ def alike(links: tuple[Link, ...]) -> list[tuple[np.ndarray, Link]]:
     >>> index.tolist(), link.measurement.anchor.shape
     ([0, 1, 2], (3, 2))
     """
-    groups: dict[Any, list[int]] = {}
-    nameless = [Link("", a.measurement, a.sight, a.noises, a.reports) for a in links]
-    for m, link in enumerate(nameless):
-        leaves, structure = jax.tree.flatten(link)
-        groups.setdefault((structure, tuple((np.shape(x), jnp.result_type(x)) for x in leaves)), []).append(m)
-
-    def stack(*leaves):
-        return (jnp if any(isinstance(x, jax.Array) for x in leaves) else np).stack(leaves)
-
-    return [(np.array(index), jax.tree.map(stack, *(nameless[m] for m in index))) for index in groups.values()]
+    return stacks(Link("", a.measurement, a.sight, a.noises, a.reports) for a in links)
 
 
 class Scenario(eqx.Module):

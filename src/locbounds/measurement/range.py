@@ -1,15 +1,15 @@
 """Ranges: distance to one anchor (time of arrival times the speed of light, round trips halved)."""
 
+from typing import ClassVar
+
 import equinox as eqx
-import jax.numpy as jnp
-import numpy as np
 
 from locbounds.axes import Array, Float, Scalar
-from locbounds.errors import InputError
-from locbounds.precision import float64, traced
+from locbounds.measurement.base import Measurement, check_anchor, distance, far
+from locbounds.precision import float64
 
 
-class Range(eqx.Module):
+class Range(Measurement):
     """Distance to an anchor.
 
     Parameters
@@ -29,23 +29,29 @@ class Range(eqx.Module):
 
     Examples
     --------
+    >>> import numpy as np
     >>> float(Range([0.0, 0.0])(np.array([3.0, 4.0])))
     5.0
     """
 
     anchor: Float[Array, " space"] = eqx.field(converter=float64)
+    size: ClassVar[int] = 1
+    unit: ClassVar[str] = "m"
+    clocked: ClassVar[bool] = True
 
     def __check_init__(self):
-        if traced(self.anchor):
-            return
-        if self.anchor.shape not in ((2,), (3,)) or not np.all(np.isfinite(self.anchor)):
-            raise InputError(f"anchor position is {self.anchor}", "Give 2 or 3 finite coordinates in metres")
+        check_anchor(self.anchor)
 
     def under(self, mode: int) -> "Range":
         """The measurement under one sight condition: itself."""
         return self
 
+    @property
+    def dim(self) -> int:
+        return len(self.anchor)
+
     def __call__(self, position: Float[Array, " space"]) -> Scalar:
-        square = jnp.sum((position - self.anchor) ** 2, axis=-1)
-        safe = jnp.where(square > 0, square, 1.0)
-        return jnp.where(square > 0, jnp.sqrt(safe), 0.0)
+        return distance(position, self.anchor)
+
+    def singular(self, points: Float[Array, "points space"]) -> Float[Array, " points"]:
+        return far(points, self.anchor)

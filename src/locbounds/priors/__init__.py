@@ -1,6 +1,18 @@
-"""What is known of the state before the first measurement."""
+"""What is known of the state, or of a static position, before the first measurement."""
 
 from locbounds.priors.density import DensityPrior
 from locbounds.priors.gaussian import GaussianPrior
+from locbounds.priors.mixture import PriorMixture
+from locbounds.priors.polygon import UniformPolygon
+from locbounds.priors.position import PositionPrior
+from locbounds.priors.uniform import UniformBox, UniformDisc
 
-__all__ = ["DensityPrior", "GaussianPrior"]
+__all__ = [
+    "DensityPrior",
+    "GaussianPrior",
+    "PositionPrior",
+    "PriorMixture",
+    "UniformBox",
+    "UniformDisc",
+    "UniformPolygon",
+]
