@@ -43,7 +43,7 @@ from .noise import (
 )
 from .plan import Observations, Plan, aoa, observe, rss, tdoa, toa
 from .priors import DensityPrior, GaussianPrior, PriorMixture, UniformBox, UniformDisc, UniformPolygon
-from .propagation import Building, City, Links, street_links
+from .propagation import Building, City, Links, StreetRanges, street_links
 from .reference import reference
 from .registry import explain
 from .report import plot
@@ -118,6 +118,7 @@ __all__ = [
     "Scenario",
     "Score",
     "Singularity",
+    "StreetRanges",
     "StudentT",
     "SwitchingMotion",
     "Times",

@@ -2,5 +2,6 @@
 
 from locbounds.propagation.city import Building, City
 from locbounds.propagation.links import Links, street_links
+from locbounds.propagation.street_ranges import StreetRanges
 
-__all__ = ["Building", "City", "Links", "street_links"]
+__all__ = ["Building", "City", "Links", "StreetRanges", "street_links"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -22,6 +22,14 @@ class Trees(NamedTuple):
 
     length: Float[ndarray, "anchors corners"]  # inf where there is no path
     previous: Int[ndarray, "anchors corners"]  # the corner before, NONE for the anchor itself
+
+
+class View(NamedTuple):
+    """A horizon with the walls that it refers to, all relative to the graph's origin."""
+
+    horizon: Horizon
+    a: Float[ndarray, "walls 2"]
+    b: Float[ndarray, "walls 2"]
 
 
 class CornerGraph:
@@ -93,17 +101,19 @@ class CornerGraph:
         matrix = csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(n, n))
         return csr_array(matrix.maximum(matrix.T))
 
-    def view(self, place: Float[ndarray, " 2"], walls: Walls | None = None) -> Horizon:
+    def all_views(self) -> list[View]:
+        """What every corner sees."""
+        return [View(view, self._local.a, self._local.b) for view in self._views]
+
+    def view(self, place: Float[ndarray, " 2"], walls: Walls | None = None) -> View:
         """What a place sees, of all walls or of these."""
         a, b = (self._local.a, self._local.b) if walls is None else (walls.a - self.origin, walls.b - self.origin)
-        return horizon(np.asarray(place) - self.origin, a, b)
+        return View(horizon(np.asarray(place) - self.origin, a, b), a, b)
 
-    def sees(
-        self, view: Horizon, points: Float[ndarray, "points 2"], walls: Walls | None = None
-    ) -> Bool[ndarray, " points"]:
-        """Which points a place sees."""
-        a, b = (self._local.a, self._local.b) if walls is None else (walls.a - self.origin, walls.b - self.origin)
-        return sees(view, points - self.origin, a, b)
+    def sees(self, views: Sequence[View], points: Float[ndarray, "points 2"]) -> Bool[ndarray, "places points"]:
+        """Which points places see."""
+        local = points - self.origin
+        return np.array([sees(v.horizon, local, v.a, v.b) for v in views], dtype=bool).reshape(-1, len(points))
 
     def trees(self, anchors: Float[ndarray, "anchors 2"], seen: Bool[ndarray, "anchors corners"]) -> Trees:
         """Shortest paths from anchors that see these corners.

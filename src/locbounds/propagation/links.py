@@ -240,15 +240,10 @@ def street_links(city: City, anchors: Any, points: Any, *, roof: Sequence[str] |
     placed = place_anchors(city, anchors, roof=roof)
     graph, m = city.graph, len(placed.names)
     views = [graph.view(p, w) for p, w in zip(placed.position, placed.own, strict=True)]
-
-    def seen(what: ndarray) -> Bool[ndarray, "anchors places"]:
-        found = [graph.sees(v, what, w) for v, w in zip(views, placed.own, strict=True)]
-        return np.array(found).reshape(m, len(what))
-
-    trees = graph.trees(placed.position, seen(graph.corner))
+    trees = graph.trees(placed.position, graph.sees(views, graph.corner))
     inside = city.inside(where)
     distance = np.linalg.norm(where[None] - placed.position[:, None], axis=-1)
-    direct = seen(where) & ~inside
+    direct = graph.sees(views, where) & ~inside
     length, last = np.where(direct, distance, np.inf), np.full((m, len(where)), NONE)
     free = np.flatnonzero(~inside & ~direct.all(axis=0))
     for begin in range(0, len(free), CHUNK):
