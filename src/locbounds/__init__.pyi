@@ -43,7 +43,7 @@ from .noise import (
 )
 from .plan import Observations, Plan, aoa, observe, rss, tdoa, toa
 from .priors import DensityPrior, GaussianPrior, PriorMixture, UniformBox, UniformDisc, UniformPolygon
-from .propagation import Building, City, Links, StreetRanges, street_links
+from .propagation import Building, City, Links, StreetCell, StreetRanges, street_cells, street_links, uniform_on
 from .reference import reference
 from .registry import explain
 from .report import plot
@@ -118,6 +118,7 @@ __all__ = [
     "Scenario",
     "Score",
     "Singularity",
+    "StreetCell",
     "StreetRanges",
     "StudentT",
     "SwitchingMotion",
@@ -155,6 +156,7 @@ __all__ = [
     "save",
     "score",
     "simulate",
+    "street_cells",
     "street_links",
     "survey_bound",
     "survey_model",
@@ -162,4 +164,5 @@ __all__ = [
     "testing",
     "tightest",
     "toa",
+    "uniform_on",
 ]

@@ -1,7 +1,8 @@
 """Radio paths between buildings: what blocks the sight, and the shortest way around the corners."""
 
+from locbounds.propagation.cells import StreetCell, street_cells, uniform_on
 from locbounds.propagation.city import Building, City
 from locbounds.propagation.links import Links, street_links
 from locbounds.propagation.street_ranges import StreetRanges
 
-__all__ = ["Building", "City", "Links", "StreetRanges", "street_links"]
+__all__ = ["Building", "City", "Links", "StreetCell", "StreetRanges", "street_cells", "street_links", "uniform_on"]
