@@ -16,6 +16,7 @@ from .evaluation import evaluate, quantile
 from .filters import EkfBanks, Estimates, FactorisedImmEkf, ImmEkf, ImmKf, ImmKfSmoother, OracleEkf, Rbpf
 from .fit.scenario import fit_scenario
 from .io.footprints import read_city
+from .io.link_table import read_links
 from .io.logs import read_log
 from .io.scenario_file import load, save
 from .io.surveys import read_survey
@@ -43,7 +44,17 @@ from .noise import (
 )
 from .plan import Observations, Plan, aoa, observe, rss, tdoa, toa
 from .priors import DensityPrior, GaussianPrior, PriorMixture, UniformBox, UniformDisc, UniformPolygon
-from .propagation import Building, City, Links, StreetCell, StreetRanges, street_cells, street_links, uniform_on
+from .propagation import (
+    Building,
+    City,
+    Links,
+    LinkTable,
+    StreetCell,
+    StreetRanges,
+    street_cells,
+    street_links,
+    uniform_on,
+)
 from .reference import reference
 from .registry import explain
 from .report import plot
@@ -97,6 +108,7 @@ __all__ = [
     "Laplace",
     "LinearMotion",
     "Link",
+    "LinkTable",
     "Links",
     "LocboundsError",
     "LogNormal",
@@ -149,6 +161,7 @@ __all__ = [
     "plot",
     "quantile",
     "read_city",
+    "read_links",
     "read_log",
     "read_survey",
     "reference",

@@ -29,7 +29,7 @@ def test_values_and_gradients(links):
 
 def test_differences_and_bias(links):
     city, anchors, found = links
-    plan = lb.Plan([lb.Observations([StreetRanges(city, anchors, reference=1, nlos_bias_m=5.0)], np.eye(2))])
+    plan = lb.Plan([lb.Observations([StreetRanges(city, anchors, difference_to=1, nlos_bias_m=5.0)], np.eye(2))])
     biased = found.length_m + 5.0 * (found.sight == 1)
     np.testing.assert_allclose(plan.means(found.points), biased[:, [0, 2]] - biased[:, [1]], atol=1e-9)
 
@@ -44,4 +44,4 @@ def test_inside_jit_and_alone(links):
 
 def test_too_few_anchors_for_differences():
     with pytest.raises(lb.InputError, match="differences to anchor number 0 of 1"):
-        StreetRanges(City([shapely.box(0, 0, 9, 9)]), {"a": (20.0, 0.0)}, reference=0)
+        StreetRanges(City([shapely.box(0, 0, 9, 9)]), {"a": (20.0, 0.0)}, difference_to=0)

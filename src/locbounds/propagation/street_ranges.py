@@ -64,7 +64,7 @@ class StreetRanges(Measurement):
         Name -> position in metres, or positions [anchors, 2].
     roof
         Names of anchors on roofs, or True for all that are inside a building.
-    reference
+    difference_to
         Index of an anchor: the values are differences to its path (times of arrival without a common clock).
     nlos_bias_m
         Added to every path without sight.
@@ -93,7 +93,7 @@ class StreetRanges(Measurement):
     origin: Float[Array, " 2"]
     others: Int[Array, " values"]
     nlos_bias_m: Scalar = eqx.field(converter=float64)
-    reference: int | None = eqx.field(static=True)
+    difference_to: int | None = eqx.field(static=True)
     unit: str = eqx.field(static=True, default="m")
     dim: int | None = eqx.field(static=True, default=2)
 
@@ -103,14 +103,14 @@ class StreetRanges(Measurement):
         anchors: Any,
         *,
         roof: Any = (),
-        reference: int | None = None,
+        difference_to: int | None = None,
         nlos_bias_m: float = 0.0,
     ):
         graph, placed = city.graph, place_anchors(city, anchors, roof=roof)
         count = len(placed.names)
-        if reference is not None and (count < 2 or reference not in range(count)):
+        if difference_to is not None and (count < 2 or difference_to not in range(count)):
             raise InputError(
-                f"differences to anchor number {reference} of {count}", "Give at least two anchors, counted from 0"
+                f"differences to anchor number {difference_to} of {count}", "Give at least two anchors, counted from 0"
             )
         if not np.isfinite(nlos_bias_m):
             raise InputError(f"the bias of links without sight is {nlos_bias_m} m", "Give a finite number of metres")
@@ -119,9 +119,9 @@ class StreetRanges(Measurement):
         self.anchors = Views.of(found)
         self.lengths = graph.trees(placed.position, graph.sees(found, graph.corner)).length
         self.origin = graph.origin
-        self.others = np.array([k for k in range(count) if k != reference])
+        self.others = np.array([k for k in range(count) if k != difference_to])
         self.nlos_bias_m = nlos_bias_m
-        self.reference = reference
+        self.difference_to = difference_to
         self.unit, self.dim = "m", 2
 
     @property
@@ -130,7 +130,7 @@ class StreetRanges(Measurement):
 
     @property
     def clocked(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
-        return self.reference is None
+        return self.difference_to is None
 
     @property
     def places(self) -> Float[Array, "anchors 2"]:
@@ -150,7 +150,7 @@ class StreetRanges(Measurement):
         bent = jax.lax.scan(around, jnp.full(len(anchors.place), jnp.inf), (corners, lengths))[0]
         free = jax.vmap(lambda view: view.see(fixed))(anchors)
         value = jnp.where(free, distance(anchors.place, point), bent + self.nlos_bias_m)
-        value = value if self.reference is None else value[self.others] - value[self.reference]
+        value = value if self.difference_to is None else value[self.others] - value[self.difference_to]
         return value.reshape(()) if self.size == 1 else value
 
     def singular(self, points: Float[Array, "points space"]) -> Float[Array, " points"]:
