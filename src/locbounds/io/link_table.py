@@ -80,8 +80,9 @@ def _refuse_empty(table: CsvTable, name: str, sight: Any, bias: Any, deviation: 
     for column, bad in (("bias_m", np.isnan(bias)), ("deviation_m", ~(deviation > 0))):
         wrong = np.flatnonzero(bad & (sight != UNREACHED))
         if wrong.size:
+            which = "no positive deviation_m" if column == "deviation_m" else "no bias_m"
             raise InputError(
-                f"line {table.lines[wrong[0]]} of {name} has no {'positive ' if column == 'deviation_m' else ''}{column}"
+                f"line {table.lines[wrong[0]]} of {name} has {which}"
                 + (f" (and {wrong.size - 1:,} more)" if wrong.size > 1 else ""),
                 "Fill it in, in metres, or write sight = none where the anchor is not received",
             )
@@ -95,7 +96,7 @@ def _refuse_holes(table: CsvTable, name: str, points: Any, row: Any, column: Any
         i, m = twice[0]
         line = table.lines[np.flatnonzero((row == i) & (column == m))[1]]
         raise InputError(
-            f"line {line} of {name} gives the link of ({points[i][0]:g}, {points[i][1]:g}) m to {names[m]} a second time",
+            f"line {line} of {name} gives the link of {_text(points[i])} to {names[m]} a second time",
             "Keep one of the lines",
         )
     holes = np.argwhere(count == 0)
@@ -103,6 +104,10 @@ def _refuse_holes(table: CsvTable, name: str, points: Any, row: Any, column: Any
         i, m = holes[0]
         more = f" (and {len(holes) - 1:,} more links)" if len(holes) > 1 else ""
         raise InputError(
-            f"{name} has no link of ({points[i][0]:g}, {points[i][1]:g}) m to {names[m]}{more}",
+            f"{name} has no link of {_text(points[i])} to {names[m]}{more}",
             "Give a line for every point and anchor; where the anchor is not received, with sight = none",
         )
+
+
+def _text(point: Any) -> str:
+    return f"({point[0]:g}, {point[1]:g}) m"

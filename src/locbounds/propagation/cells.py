@@ -87,6 +87,12 @@ def street_cells(streets: Any, anchors: Any, *, count: int) -> list[StreetCell]:
     ------
     InputError
         If there are fewer anchors, or no street.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> [cell.nearest for cell in lb.street_cells(shapely.box(0, 0, 9, 1), [[0, 0], [4, 0], [9, 0]], count=2)]
+    [(0, 1), (1, 0), (1, 2), (2, 1)]
     """
     places = np.asarray(anchors, dtype=float)
     if not 1 <= count <= len(places):

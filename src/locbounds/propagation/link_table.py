@@ -76,10 +76,10 @@ class LinkTable(NamedTuple):
         distance = np.linalg.norm(self.points[:, None] - self.anchors, axis=-1)
         length = np.where(self.sight == UNREACHED, np.inf, distance + self.bias_m)
         none = np.full(self.sight.shape, NONE)
-        return Links(
-            self.points, self.anchors, self.names, self.sight, length, distance, np.zeros(len(self.points), bool), none,
-            np.zeros((len(self.anchors), 0), int), np.zeros((0, 2)),
-        )  # fmt: skip
+        nothing = np.zeros((len(self.anchors), 0), int), np.zeros((0, 2))
+        outside = np.zeros(len(self.points), bool)
+        places = self.points, self.anchors, self.names
+        return Links(*places, self.sight, length, distance, outside, none, *nothing)
 
     @property
     def step_m(self) -> float:
@@ -90,8 +90,7 @@ class LinkTable(NamedTuple):
         InputError
             If they lie on none.
         """
-        steps = [np.diff(np.unique(axis)) for axis in self.points.T]
-        steps = np.concatenate([s[s > RASTER] for s in steps])
+        steps = np.array([s for axis in self.points.T for s in np.diff(np.unique(axis)) if s > RASTER])
         step = float(steps.min()) if steps.size else 1.0
         off = (self.points - self.points[0]) / step
         if np.abs(off - np.round(off)).max() > RASTER:

@@ -93,8 +93,8 @@ def draw_paths(panel: "Axes", links: Links, pairs: Iterable[tuple[int, int]]) ->
             continue
         label = None if free in known else "sight" if free else "around corners"
         known.add(free)
-        style = {"color": FREE, "ls": "-"} if free else {"color": BLOCKED, "ls": "--"}
-        panel.plot(*way.T, lw=1.4, zorder=5, label=label, **style)
+        shade, dashes = (FREE, "-") if free else (BLOCKED, "--")
+        panel.plot(*way.T, color=shade, ls=dashes, lw=1.4, zorder=5, label=label)
         panel.plot(*way[1:-1].T, "o", color=BLOCKED, ms=4, zorder=6)
 
 
