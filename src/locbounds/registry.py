@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 from locbounds.assumptions import COMMON
 from locbounds.errors import InputError
+from locbounds.plan import Plan
+from locbounds.plan_assumptions import REGULAR_PLAN, WITH_PRIOR
 from locbounds.scenario import Scenario
 from locbounds.verdict import (
     KNOWN_SIGHT,
@@ -25,15 +27,16 @@ RANGES_AND_SIGHT = frozenset({"ranges", "sight"})
 PAST_AND_FUTURE_RANGES = frozenset({"ranges", "future-ranges"})
 LOS_RANGES_AND_SIGHT = frozenset({"los-ranges", "sight"})
 FINGERPRINT = frozenset({"fingerprint"})
+MEASUREMENT = frozenset({"measurement"})
 
 
 class Method(NamedTuple):
-    """A bound or a filter.
+    """A bound, a filter, or an estimator of one position.
 
     Attributes
     ----------
     id, name, kind
-        Id used everywhere, display name, ``"bound"`` or ``"filter"``.
+        Id used everywhere, display name, ``"bound"``, ``"filter"`` or ``"estimator"``.
     summary
         One sentence.
     sees
@@ -51,7 +54,9 @@ class Method(NamedTuple):
     conditions
         Under which condition it is valid at all.
     subject
-        What it speaks of: a ``"scenario"`` or a ``"survey"``.
+        What it speaks of: a ``"scenario"``, a ``"survey"`` or a ``"plan"``.
+    on_plan
+        Predicates on a plan, for a bound of scenarios that exists for plans too.
     """
 
     id: str
@@ -66,14 +71,23 @@ class Method(NamedTuple):
     assumptions: tuple[Assumption, ...] = ()
     conditions: tuple[str, ...] = ()
     subject: str = "scenario"
+    on_plan: tuple[Assumption, ...] = ()
 
     def verdict(self, subject: Any, conditions: tuple[str, ...] = ()) -> Verdict:
-        """Whether it applies to a scenario (or to a survey model)."""
-        return judge(self.assumptions, subject, grounds=self.grounds, conditions=self.conditions + conditions)
+        """Whether it applies to a scenario (or to a survey model, or to a plan)."""
+        grounds = ON_PLAN if self.on_plan and isinstance(subject, Plan) else self.grounds
+        return judge(self.assumed(subject), subject, grounds=grounds, conditions=self.conditions + conditions)
 
-    def check(self, scenario: Scenario) -> list[tuple[str, str | None]]:
-        """Every assumption in words, and why a scenario violates it (None where it does not)."""
-        return [(a.text, a.violated(scenario)) for a in self.assumptions]
+    def check(self, subject: Any) -> list[tuple[str, str | None]]:
+        """Every assumption in words, and why a scenario or plan violates it (None where it does not)."""
+        return [(a.text, a.violated(subject)) for a in self.assumed(subject)]
+
+    def assumed(self, subject: Any) -> tuple[Assumption, ...]:
+        """The assumptions that concern a subject."""
+        return self.on_plan if self.on_plan and isinstance(subject, Plan) else self.assumptions
+
+
+ON_PLAN = ("regular prior", "smooth noise")
 
 
 METHODS: dict[str, Method] = {
@@ -92,6 +106,7 @@ METHODS: dict[str, Method] = {
             "real errors are correlated in time beyond the chain.",
             ("fritsche2013", "louis1982"),
             (*COMMON, SMOOTH_NOISE),
+            on_plan=REGULAR_PLAN,
         ),
         Method(
             "enumer",
@@ -151,6 +166,50 @@ METHODS: dict[str, Method] = {
                 "Gaussian noise, the same everywhere, around the mean fingerprints of the survey",
             ),
             "survey",
+        ),
+        Method(
+            "wwb",
+            "WWB",
+            "bound",
+            "Weiss-Weinstein bound of a static position with a prior: no estimator has a smaller mean square error, "
+            "whatever the prior's support and the noise.",
+            MEASUREMENT,
+            "locbounds.static:wwb",
+            ("any prior", "any measurement"),
+            "Loose at high noise with few test points; neither always above nor always below the EZZB.",
+            ("weinstein1988", "mcguire2009"),
+            (WITH_PRIOR,),
+            subject="plan",
+        ),
+        Method(
+            "ezzb",
+            "EZZB",
+            "bound",
+            "Extended Ziv-Zakai bound of a static position with a prior: no estimator has a smaller mean square error, "
+            "whatever the prior's support and the noise.",
+            MEASUREMENT,
+            "locbounds.static:ezzb",
+            ("any prior", "any measurement"),
+            "Bounds one direction at a time, so that its sum over axes is not tight at low noise where the accuracy "
+            "differs from place to place.",
+            ("bell1997", "mcguire2009"),
+            (WITH_PRIOR,),
+            subject="plan",
+        ),
+        Method(
+            "barankin",
+            "Barankin bound",
+            "bound",
+            "Barankin bound at given places, in the form with several test points: no unbiased estimator has a smaller "
+            "variance there.",
+            MEASUREMENT,
+            "locbounds.static:barankin",
+            (),
+            "Says nothing about biased estimators, and every estimator that uses a prior or an edge is biased.",
+            ("rife1975", "mcguire2009"),
+            (),
+            ("estimators without bias at the place and at all test points",),
+            subject="plan",
         ),
         Method(
             "imm-ekf",
@@ -234,6 +293,45 @@ METHODS: dict[str, Method] = {
             "Not a filter one can build; may lie below the BCRB.",
             ("fritsche2013",),
         ),
+        Method(
+            "mmse",
+            "MMSE",
+            "estimator",
+            "Posterior mean by quadrature: the least mean square error that is possible, with its standard error.",
+            MEASUREMENT,
+            "locbounds.static:mmse",
+            (),
+            "Costs draws times places; it needs the prior and the noise to be right.",
+            ("mcguire2009",),
+            (WITH_PRIOR,),
+            subject="plan",
+        ),
+        Method(
+            "ml",
+            "ML",
+            "estimator",
+            "Most likely place within the support of the prior, whose density it does not use.",
+            MEASUREMENT,
+            "locbounds.static:ml",
+            (),
+            "Far from the least error at high noise, where it sits on the edge of the support.",
+            ("mcguire2009",),
+            (WITH_PRIOR,),
+            subject="plan",
+        ),
+        Method(
+            "ls",
+            "Least squares",
+            "estimator",
+            "Place with the least sum of squared differences, not weighted, in a box three times as wide as the support.",
+            MEASUREMENT,
+            "locbounds.static:ls",
+            (),
+            "Knows neither prior nor noise; wild where the geometry is poor.",
+            ("mcguire2009",),
+            (WITH_PRIOR,),
+            subject="plan",
+        ),
     )
 }
 
@@ -282,7 +380,7 @@ def method(id: str, kind: str | None = None) -> Method:
 
 
 def bounds_of(subject: str) -> list[Method]:
-    """The bounds that speak of a scenario, or of a survey.
+    """The bounds that speak of a scenario, of a survey, or of a plan.
 
     >>> [m.id for m in bounds_of("survey")]
     ['survey']
@@ -318,7 +416,7 @@ def describe(entry: Method) -> dict[str, Any]:
     }
 
 
-def explain(id: str, scenario: Scenario | None = None) -> str:
+def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
     """What a bound or filter assumes, when it misleads, and whom to cite; made from the table of methods.
 
     Parameters

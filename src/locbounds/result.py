@@ -56,7 +56,7 @@ def _versions() -> tuple[tuple[str, str], ...]:
 
 
 class Result(eqx.Module):
-    """Accuracy over time, of a bound or of a filter.
+    """Accuracy over time, of a bound or of a filter; one "time" for the position of a plan.
 
     Everything estimated carries its spread over ``groups`` independent groups of draws, from which the standard error
     of any average follows; a deterministic number has one group and the error zero.
@@ -64,7 +64,7 @@ class Result(eqx.Module):
     Attributes
     ----------
     id, name, kind
-        Method id (``bcrb``, ``imm-ekf``), display name, ``"bound"`` or ``"filter"``.
+        Method id (``bcrb``, ``imm-ekf``), display name, ``"bound"``, ``"filter"`` or ``"estimator"``.
     sees
         What an estimator that this number speaks of may see (``ranges``: past and present ranges; ``sight``).
     time_s
@@ -149,7 +149,7 @@ class Result(eqx.Module):
             If the bound does not bound this filter: it assumes less than the filter sees, belongs to one track, was
             refused, or stands on other time steps.
         """
-        if bound.kind != "bound" or self.kind != "filter":
+        if bound.kind != "bound" or self.kind == "bound":
             raise RefusedError(
                 f"efficiency compares a filter with a bound, not a {self.kind} ({self.name}) with a {bound.kind} "
                 f"({bound.name})",
@@ -220,8 +220,9 @@ class Result(eqx.Module):
         if traced(self):
             return f"{self.name}: traced"
         number = format_with_error(self.mean_position_rmse(), self.mean_position_rmse_stderr())
-        where = f" along {self.track}" if self.track else ""
-        return f"{self.name}: position RMSE {number}, mean over steps 0..{len(self.time_s) - 1}{where}; {self.verdict}"
+        where = "" if not self.track else f" {self.track}" if self.track.startswith("at ") else f" along {self.track}"
+        over = f", mean over steps 0..{len(self.time_s) - 1}" if len(self.time_s) > 1 else ""
+        return f"{self.name}: position RMSE {number}{over}{where}; {self.verdict}"
 
 
 class Efficiency(eqx.Module):

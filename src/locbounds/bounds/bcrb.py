@@ -8,6 +8,7 @@ import numpy as np
 
 from locbounds.axes import Array, Float
 from locbounds.blocks import GROUPS, check_seed
+from locbounds.bounds.bcrb_of_plan import bcrb_of_plan
 from locbounds.bounds.common import bound_result, prepare
 from locbounds.bounds.corrected import corrected
 from locbounds.bounds.expectation import Expectation
@@ -19,6 +20,7 @@ from locbounds.bounds.separated import SeparatedIncrements, geometry
 from locbounds.bounds.truncation import extrapolated, shortened
 from locbounds.errors import InputError, RefusedError
 from locbounds.model import JumpMarkov, jump_markov
+from locbounds.plan import Plan
 from locbounds.precision import double_precision, traced
 from locbounds.result import Result
 from locbounds.scenario import Scenario, beyond_separation
@@ -72,7 +74,7 @@ def _solve(scenario, C, G) -> _Solution:
 
 @double_precision
 def bcrb(
-    scenario: Scenario | JumpMarkov,
+    scenario: Scenario | JumpMarkov | Plan,
     *,
     rtol: float | None = None,
     samples: int | None = None,
@@ -82,7 +84,7 @@ def bcrb(
     engine: str | None = None,
     progress: Progress | None = None,
 ) -> Result:
-    r"""Bayesian Cramér-Rao bound of a jump-Markov model, at every step.
+    r"""Bayesian Cramér-Rao bound of a jump-Markov model, at every step; or of a plan, one number.
 
     The engine is chosen by what the model needs; ``provenance.how`` names it and the reason. The general engine
     (:mod:`locbounds.bounds.general`) takes every :class:`~locbounds.JumpMarkov` and every scenario whose motion
@@ -94,7 +96,9 @@ def bcrb(
     Parameters
     ----------
     scenario
-        The model. Noises of different links are independent, and so are chains that are not named as one.
+        The model. Noises of different links are independent, and so are chains that are not named as one. For a
+        :class:`~locbounds.Plan` the inverse of the expected information of measurements and prior, by quadrature; it is
+        refused where the prior jumps at an edge or the expected information is infinite.
     rtol
         Largest relative standard error of the position RMSE over the steps; draws are added until it is reached.
         Default 1e-3.
@@ -148,6 +152,8 @@ def bcrb(
     >>> bool(abs(bound.mean_position_rmse() - 51.2) < 0.2)
     True
     """
+    if isinstance(scenario, Plan):
+        return bcrb_of_plan(scenario, rtol=1e-3 if rtol is None else rtol)
     if isinstance(scenario, JumpMarkov) or beyond_separation(scenario):
         if engine is not None:
             raise InputError(f"engine {engine!r} does not take this model", "Leave the engine out")

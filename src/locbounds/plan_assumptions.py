@@ -1,0 +1,95 @@
+"""Assumptions of bounds on the position of a plan, as predicates: which plan violates them, and why."""
+
+from typing import Any
+
+import numpy as np
+
+from locbounds.measurement import Bearing, PathLoss
+from locbounds.plan import Plan
+from locbounds.verdict import Assumption
+
+
+def no_prior(plan: Plan) -> str | None:
+    """That the plan has no prior, or None."""
+    return "the plan has no prior: nothing is averaged over" if plan.prior is None else None
+
+
+def irregular_prior(plan: Plan) -> str | None:
+    """Why the prior has no finite information, or None."""
+    if plan.prior is None:
+        return None
+    why = plan.prior.irregular()
+    return None if why is None else f"{why}: the prior has no finite information"
+
+
+def irregular_channel(plan: Plan) -> str | None:
+    """Why the Fisher information of some channel's noise does not exist, or None."""
+    return _noise(plan, False, "has no finite Fisher information")
+
+
+def undecided_channel(plan: Plan) -> str | None:
+    """Why it is not known whether it exists, or None."""
+    return _noise(plan, None, "is not known to have a finite Fisher information")
+
+
+def _noise(plan: Plan, finite: bool | None, words: str) -> str | None:
+    for group in plan.groups:
+        for name, noise in zip(group.channel_names, group.noises or (), strict=False):
+            regularity = noise.regularity()
+            if regularity.finite is finite:
+                return f"the noise of {name} {words}: {regularity.reason}"
+    return None
+
+
+def discontinuous(plan: Plan) -> str | None:
+    """Which measurement jumps from one place to the next, or None."""
+    for m, name in _measurements(plan):
+        if not getattr(m, "continuous", True):
+            return f"the measurement of {name} jumps where the line of sight is lost"
+    return None
+
+
+def diverging_information(plan: Plan) -> str | None:
+    """Which measurement is so steep near its anchor that the expected information is infinite, or None.
+
+    A gradient that grows like 1/r has no finite mean square over a density that is positive at the anchor of a plane,
+    or anywhere on the vertical through it (bearings).
+    """
+    if plan.prior is None:
+        return None
+    for m, name in _measurements(plan):
+        steep = isinstance(m, Bearing) or (isinstance(m, PathLoss) and m.near_field_m is None and plan.dim < 3)
+        if steep and _comes_to(plan.prior, np.asarray(m.anchor), vertical=isinstance(m, Bearing)):
+            what = "angle" if isinstance(m, Bearing) else "strength"
+            return (
+                f"the {what} of {name} changes like 1/r near the anchor, where the prior's density is positive: its "
+                "expected information is infinite, the bound zero, and a Monte Carlo value drifts with the number of draws"
+                + ("" if isinstance(m, Bearing) else " (a near-field radius, near_field_m, makes it finite)")
+            )
+    return None
+
+
+def _measurements(plan: Plan) -> list[tuple[Any, str]]:
+    return [pair for group in plan.groups for pair in zip(group.measurements, group.names, strict=True)]
+
+
+def _comes_to(prior: Any, anchor: np.ndarray, *, vertical: bool) -> bool:
+    """Whether the anchor (or the vertical through it) is in the support or on its edge."""
+    low, high = prior.bounds()
+    size = 1e-9 * np.linalg.norm(high - low)
+    angles = np.arange(8) * np.pi / 4
+    around = np.zeros((9, len(anchor)))
+    around[1:, :2] = size * np.stack([np.cos(angles), np.sin(angles)], -1)
+    points = anchor + around
+    if vertical and len(anchor) == 3:
+        heights = np.linspace(low[2], high[2], 65)
+        points = np.concatenate([np.column_stack([points[:, :2], np.full(9, z)]) for z in heights])
+    return bool(np.any(prior.inside(points)))
+
+
+WITH_PRIOR = Assumption("the plan has a prior", no_prior)
+REGULAR_PRIOR = Assumption("the prior's density vanishes smoothly where it ends", irregular_prior)
+REGULAR_CHANNELS = Assumption("every channel's noise has a finite Fisher information", irregular_channel, undecided_channel)
+CONTINUOUS = Assumption("every measurement is continuous over the places that the prior allows", discontinuous)
+FINITE_EXPECTATION = Assumption("the expected information is finite", diverging_information)
+REGULAR_PLAN = (WITH_PRIOR, REGULAR_PRIOR, REGULAR_CHANNELS, CONTINUOUS, FINITE_EXPECTATION)
