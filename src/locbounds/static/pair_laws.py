@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,7 @@ TABLE = 513  # differences at which the coefficient of a wrapped normal law is t
 NARROW = 0.02  # deviation over period below which no table is needed
 
 
+@runtime_checkable
 class PairLaw(Protocol):
     """What a bound asks of a measurement law."""
 

@@ -1,0 +1,315 @@
+"""Figs. 7 and 8 of McGuire and Plataniotis (2009): terminals in the streets of a dense city.
+
+Buildings of 300 m, streets of 20 m. The chapter does not print where the stations are: at every other crossing, like
+one colour of a checkerboard, its statements hold (the nearest station has sight, the other two are one corner away).
+The terminal is anywhere on the streets with equal probability and measured by its three nearest stations. Which three
+these are tells the stretch of street, from the nearest station to the next crossing: all stretches are alike, so that
+one stands for all. That support is convex, and a Weiss-Weinstein bound needs a length of its own along and across it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import shapely
+
+from locbounds.axes import LOS, Float, ndarray
+from locbounds.plan import Observations, Plan
+from locbounds.precision import double_precision
+from locbounds.propagation import City, StreetCell, StreetRanges, street_cells, street_links
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+BLOCK_M, STREET_M = 300.0, 20.0
+PITCH_M = BLOCK_M + STREET_M
+IN_USE = 3
+SIGMAS_M = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+CASES = ("toa", "tdoa")
+NODES, FINER = 10, 16  # of the quadrature, along a side
+GRID = (14, 9)  # lengths along and across the street that are tried first
+ZOOMS, AROUND = 4, (-1.0, 0.0, 1.0)
+
+
+class Row(NamedTuple):
+    """One number of Fig. 8."""
+
+    case: str
+    sigma: float
+    method: str
+    rmse_m: float
+    stderr_m: float
+    valid: bool
+
+
+def city(blocks: int = 2) -> City:
+    """Square blocks, ``2 * blocks`` along each side, around the crossing at the origin.
+
+    Examples
+    --------
+    >>> len(city(1).buildings), city(1).streets().area
+    (4, 24400.0)
+    """
+    corner = PITCH_M * np.arange(-blocks, blocks) + STREET_M / 2
+    return City([shapely.box(x, y, x + BLOCK_M, y + BLOCK_M) for x in corner for y in corner])
+
+
+def nearby() -> City:
+    """The six blocks around one stretch: no shortest path of its links goes beyond them.
+
+    Examples
+    --------
+    >>> len(nearby().buildings)
+    6
+    """
+    inner = [b for b in city(2).buildings if b.polygon.bounds[0] < 400 and b.polygon.bounds[0] > -400]
+    return City([b for b in inner if abs(b.polygon.centroid.y) < PITCH_M])
+
+
+def stations(reach: int = 2) -> dict[str, tuple[float, float]]:
+    """Every other crossing, up to ``reach`` crossings from the origin.
+
+    Examples
+    --------
+    >>> stations(1)
+    {'-1,-1': (-320.0, -320.0), '-1,1': (-320.0, 320.0), '0,0': (0.0, 0.0), '1,-1': (320.0, -320.0), '1,1': (320.0, 320.0)}
+    """
+    around = range(-reach, reach + 1)
+    return {f"{i},{j}": (i * PITCH_M, j * PITCH_M) for i in around for j in around if (i + j) % 2 == 0}
+
+
+def stretch() -> tuple[StreetCell, Float[ndarray, "stations 2"]]:
+    """The street from the station at the origin to the crossing on its right, and its stations, the nearest one first.
+
+    Examples
+    --------
+    >>> cell, places = stretch()
+    >>> round(cell.region.area), places.tolist()
+    (6200, [[0.0, 0.0], [320.0, -320.0], [320.0, 320.0]])
+    """
+    known = stations()
+    around = shapely.box(-PITCH_M, -PITCH_M, PITCH_M, PITCH_M)
+    for cell in street_cells(city().streets(around), list(known.values()), count=IN_USE):
+        places = np.array([list(known.values())[k] for k in cell.nearest])
+        if not places[0].any() and (places[1:, 0] > 0).all():
+            return cell, places
+    raise AssertionError("unreachable")
+
+
+def plan(case: str = "toa", sigma_m: float = 1.0) -> Plan:
+    """Times of arrival, or their differences to the nearest station, on one stretch of street.
+
+    Examples
+    --------
+    >>> plan("tdoa", 10.0).groups[0].covariance.tolist()
+    [[200.0, 100.0], [100.0, 200.0]]
+    """
+    cell, places = stretch()
+    to = None if case == "toa" else 0
+    ranges = StreetRanges(nearby(), places, difference_to=to)
+    covariance = sigma_m**2 * (np.eye(IN_USE) if to is None else np.eye(IN_USE - 1) + 1.0)
+    return Plan([Observations([ranges], covariance)], prior=cell.prior)
+
+
+class Statements(NamedTuple):
+    """What the chapter says of this city, measured on the streets.
+
+    Attributes
+    ----------
+    nearest_los, other_los : float
+        Share of the streets where the nearest station, and another one in use, has sight.
+    corners : float
+        Share of the links without sight that bend around exactly one corner.
+    """
+
+    nearest_los: float
+    other_los: float
+    corners: float
+
+
+def statements(nodes: int = 60) -> Statements:
+    """Sight and corners on one stretch, by quadrature.
+
+    Examples
+    --------
+    >>> found = statements(20)
+    >>> found.nearest_los, found.corners, bool(found.other_los < 0.03)
+    (1.0, 1.0, True)
+    """
+    cell, places = stretch()
+    points, weights = cell.prior.nodes(nodes)
+    links = street_links(city(), places, points)
+    free = weights @ (links.sight == LOS)
+    bends = [len(links.path(i, m)) - 2 for i, m in np.argwhere(links.sight != LOS)[:: nodes // 4].tolist()]
+    return Statements(round(float(free[0]), 12), float(free[1:].mean()), float(np.mean(np.array(bends) == 1)))
+
+
+@double_precision
+def weiss_weinstein(
+    case: str, sigmas_m: Sequence[float], *, equal: bool = False
+) -> list[tuple[float, Float[ndarray, " 2"], float]]:
+    """Largest Weiss-Weinstein bound over a length along and a length across the street, per noise level.
+
+    Parameters
+    ----------
+    case
+        ``"toa"`` or ``"tdoa"``.
+    sigmas_m
+        Deviations of a time of arrival, in metres.
+    equal
+        One length for both directions, as the chapter's (17).
+
+    Returns
+    -------
+    list
+        RMSE in metres, the two lengths in metres, and the relative quadrature error, per noise level.
+    """
+    from locbounds.static import weiss_weinstein_kernel as kernel
+    from locbounds.static.plan_laws import pair_law, support_of
+
+    one = plan(case)
+    assert one.prior is not None
+    support, law = support_of(one.prior), pair_law(one)
+    reach = np.array([support.reach(axis) for axis in np.eye(2)])
+    if equal:
+        reach = np.full(2, reach.min())
+
+    def values(logs: ndarray, nodes: int) -> ndarray:
+        tests = [np.diag(np.exp(x) * reach) for x in logs]
+        found = kernel.grams(support, law, tests, nodes, sigmas_m)
+        return np.stack(
+            [np.trace(kernel.bound_matrices(H, g), axis1=1, axis2=2) for H, g in zip(tests, found, strict=True)]
+        )
+
+    axes = [np.log(np.geomspace(low, 0.9, n)) for low, n in zip((5e-4, 0.1), GRID, strict=True)]
+    if equal:
+        logs = np.repeat(np.log(np.geomspace(5e-4, 0.9, 3 * GRID[0]))[:, None], 2, axis=1)
+    else:
+        logs = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2)
+    step = np.array([a[1] - a[0] for a in axes])
+    mse = values(logs, NODES)
+    for _ in range(ZOOMS):
+        step = step / 2
+        offsets = [(a, a) for a in AROUND] if equal else [(a, b) for a in AROUND for b in AROUND]
+        tops = np.unique(logs[mse.argmax(0)], axis=0)
+        near = np.minimum((tops[:, None] + np.array(offsets) * step).reshape(-1, 2), np.log(0.98))
+        logs, mse = np.concatenate([logs, near]), np.concatenate([mse, values(near, NODES)])
+    best = logs[mse.argmax(0)]
+    fine = values(best, FINER)[np.arange(len(best)), np.arange(len(best))]
+    change = np.abs(np.sqrt(fine / mse.max(0)) - 1)
+    return [(float(np.sqrt(m)), np.exp(x) * reach, float(c)) for m, x, c in zip(fine, best, change, strict=True)]
+
+
+def fig8(
+    sigmas_m: Sequence[float] = SIGMAS_M,
+    *,
+    cases: Sequence[str] = CASES,
+    rtol: float = 2e-3,
+    seed: int = 0,
+    announce: Callable[[str], None] = lambda text: None,
+) -> list[Row]:
+    """Fig. 8: Weiss-Weinstein and Ziv-Zakai bounds and the least RMSE on the streets.
+
+    Parameters
+    ----------
+    sigmas_m
+        Deviations of a time of arrival, in metres; the chapter's are not printed.
+    cases
+        ``"toa"`` and ``"tdoa"``.
+    rtol
+        Relative standard error of the least RMSE.
+    seed
+        Of its draws.
+    announce
+        Told what is being done.
+    """
+    from locbounds.static.mmse import mmse
+    from locbounds.static.ziv_zakai import ezzb
+
+    rows = []
+    for case in cases:
+        announce(f"Fig. 8, {case.upper()}: Weiss-Weinstein")
+        for method, equal in (("wwb", False), ("wwb-equal", True)):
+            found = weiss_weinstein(case, sigmas_m, equal=equal)
+            rows += [Row(case, s, method, value, 0.0, True) for s, (value, _, _) in zip(sigmas_m, found, strict=True)]
+        for sigma in sigmas_m:
+            announce(f"Fig. 8, {case.upper()}, {sigma:g} m: Ziv-Zakai and least error")
+            here = plan(case, sigma)
+            for method, result in (("ezzb", ezzb(here)), ("mmse", mmse(here, rtol=rtol, seed=seed))):
+                value = float(np.sqrt(np.asarray(result.position_mse)).item())
+                error = value * result.relative_stderr()
+                rows.append(Row(case, sigma, method, value, float(error), True))
+    return rows
+
+
+def fig8_csv(rows: Sequence[Row]) -> str:
+    """Fig. 8 as CSV: case, sigma, method, rmse_m, stderr_m, valid."""
+    from locbounds.report.tables import csv_text
+
+    return csv_text(Row._fields, [row._replace(valid=str(row.valid).lower()) for row in rows])  # pyright: ignore
+
+
+LOOKS = {
+    "mmse": ("least possible (MMSE)", "o", "none", "black"),
+    "ezzb": ("Ziv-Zakai", "", "-", "C2"),
+    "wwb": ("Weiss-Weinstein, lengths along and across", "", "-", "C0"),
+    "wwb-equal": ("Weiss-Weinstein, one length", "", ":", "C0"),
+}
+
+
+def fig8_figure(rows: Sequence[Row]) -> Figure:
+    """Fig. 8: RMSE over the noise, one panel per case."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import FixedLocator, FormatStrFormatter, NullFormatter
+
+    cases = list(dict.fromkeys(row.case for row in rows))
+    figure = Figure(figsize=(10.0, 4.8), layout="constrained")
+    panels = figure.subplots(1, len(cases), sharey=True, squeeze=False)[0]
+    for panel, case in zip(panels, cases, strict=True):
+        for method, (label, marker, line, colour) in LOOKS.items():
+            mine = [row for row in rows if (row.case, row.method) == (case, method)]
+            panel.errorbar(
+                [row.sigma for row in mine], [row.rmse_m for row in mine],
+                [2 * row.stderr_m for row in mine] if marker else None,
+                label=label, marker=marker, ls=line, color=colour, ms=5, capsize=2,
+            )  # fmt: skip
+        panel.set(xscale="log", yscale="log", xlabel="standard deviation of a time of arrival in m")
+        for axis, ticks in ((panel.xaxis, (1, 2, 5, 10, 20, 50, 100)), (panel.yaxis, (3, 5, 10, 20, 50))):
+            axis.set_major_locator(FixedLocator(ticks))
+            axis.set_major_formatter(FormatStrFormatter("%g"))
+            axis.set_minor_formatter(NullFormatter())
+        panel.set_title({"toa": "Times of arrival", "tdoa": "Time differences of arrival"}[case], loc="left")
+        panel.grid(alpha=0.3, which="both")
+    panels[0].set_ylabel("position RMSE in m")
+    handles = panels[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
+def fig7_figure() -> Figure:
+    """Fig. 7: the city, its stations, one stretch of street and the links of a terminal on it."""
+    from matplotlib.figure import Figure
+    from matplotlib.patches import PathPatch
+
+    from locbounds.report.city_plot import draw_anchors, draw_buildings, draw_paths, outline
+
+    cell, places = stretch()
+    whole = city(3)
+    links = street_links(whole, places, [[200.0, -4.0]])
+    figure = Figure(figsize=(7.0, 6.1), layout="constrained")
+    panel = figure.subplots()
+    draw_buildings(panel, whole, bounds=(-480, -480, 800, 480))
+    panel.add_patch(PathPatch(outline(cell.region), facecolor="#F4D58D", edgecolor="none", zorder=1))
+    draw_paths(panel, links, [(0, m) for m in range(IN_USE)])
+    panel.plot(*links.points.T, "s", color="white", mec="black", ms=6, zorder=7, ls="", label="terminal")
+    others = [p for p in stations(3).values() if not any(np.array_equal(p, q) for q in places)]
+    panel.plot(*np.array(others).T, "^", color="0.55", mec="white", ms=8, ls="", zorder=7, label="other stations")
+    draw_anchors(panel, places, ["nearest", "second", "third"])
+    panel.plot([], [], "s", color="#F4D58D", label="where these three are nearest")
+    panel.set_title(
+        "Streets of 20 m between blocks of 300 m, stations at every other crossing", loc="left", fontsize=10
+    )
+    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
+    return figure
