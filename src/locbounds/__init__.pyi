@@ -64,6 +64,7 @@ from .scenario import Link, Scenario
 from .scoring import Score, score
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
+from .street_walk import Walk, street_walk
 from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
 
@@ -140,6 +141,7 @@ __all__ = [
     "UniformBox",
     "UniformDisc",
     "UniformPolygon",
+    "Walk",
     "aoa",
     "bcrb",
     "bcrb_algorithm1",
@@ -171,6 +173,7 @@ __all__ = [
     "simulate",
     "street_cells",
     "street_links",
+    "street_walk",
     "survey_bound",
     "survey_model",
     "tdoa",

@@ -89,9 +89,7 @@ def _comes_to(prior: Any, anchor: np.ndarray, *, vertical: bool) -> bool:
 
 WITH_PRIOR = Assumption("the plan has a prior", no_prior)
 REGULAR_PRIOR = Assumption("the prior's density vanishes smoothly where it ends", irregular_prior)
-REGULAR_CHANNELS = Assumption(
-    "every channel's noise has a finite Fisher information", irregular_channel, undecided_channel
-)
+REGULAR_CHANNELS = Assumption("every channel's noise has a finite Fisher information", irregular_channel, undecided_channel)
 CONTINUOUS = Assumption("every measurement is continuous over the places that the prior allows", discontinuous)
 FINITE_EXPECTATION = Assumption("the expected information is finite", diverging_information)
 REGULAR_PLAN = (WITH_PRIOR, REGULAR_PRIOR, REGULAR_CHANNELS, CONTINUOUS, FINITE_EXPECTATION)

@@ -73,8 +73,8 @@ def stations(reach: int = 2) -> dict[str, tuple[float, float]]:
 
     Examples
     --------
-    >>> stations(1)
-    {'-1,-1': (-320.0, -320.0), '-1,1': (-320.0, 320.0), '0,0': (0.0, 0.0), '1,-1': (320.0, -320.0), '1,1': (320.0, 320.0)}
+    >>> list(stations(1)), stations(1)["1,1"]
+    (['-1,-1', '-1,1', '0,0', '1,-1', '1,1'], (320.0, 320.0))
     """
     around = range(-reach, reach + 1)
     return {f"{i},{j}": (i * PITCH_M, j * PITCH_M) for i in around for j in around if (i + j) % 2 == 0}
@@ -179,9 +179,8 @@ def weiss_weinstein(
     def values(logs: ndarray, nodes: int) -> ndarray:
         tests = [np.diag(np.exp(x) * reach) for x in logs]
         found = kernel.grams(support, law, tests, nodes, sigmas_m)
-        return np.stack(
-            [np.trace(kernel.bound_matrices(H, g), axis1=1, axis2=2) for H, g in zip(tests, found, strict=True)]
-        )
+        traces = [np.trace(kernel.bound_matrices(H, g), axis1=1, axis2=2) for H, g in zip(tests, found, strict=True)]
+        return np.stack(traces)
 
     axes = [np.log(np.geomspace(low, 0.9, n)) for low, n in zip((5e-4, 0.1), GRID, strict=True)]
     if equal:

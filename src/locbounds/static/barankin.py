@@ -29,9 +29,7 @@ DIRECTIONS = 12
 RANK = 1e-10
 
 
-def barankin_matrix(
-    H: Float[ndarray, "space tests"], v: Float[ndarray, "tests channels"]
-) -> Float[ndarray, "space space"]:
+def barankin_matrix(H: Float[ndarray, "space tests"], v: Float[ndarray, "tests channels"]) -> Float[ndarray, "space space"]:
     """The bound from test vectors H and the whitened differences ``v_i = W (m(theta + h_i) - m(theta))``.
 
     Rows are scaled by ``exp(-|v_i|^2 / 2)``, so that far test points vanish instead of overflowing.
@@ -41,11 +39,7 @@ def barankin_matrix(
     0.25
     """
     square = np.square(v).sum(1)
-    B = (
-        np.exp(-0.5 * (square[:, None] + square)) * np.expm1(v @ v.T)
-        if np.max(square, initial=0) < 300
-        else _far(v, square)
-    )
+    B = np.exp(-0.5 * (square[:, None] + square)) * np.expm1(v @ v.T) if np.max(square, initial=0) < 300 else _far(v, square)
     moved = H * np.exp(-0.5 * square)
     size = np.sqrt(np.maximum(np.diagonal(B), 0.0))
     keep = (size > 0) & (square < 600)
@@ -62,7 +56,9 @@ def _far(v: ndarray, square: ndarray) -> ndarray:
 
 
 @double_precision
-def barankin(plan: Plan, points: Any, *, tests: Float[ndarray, "space tests"] | None = None) -> Result | list[Result]:
+def barankin(
+    plan: Plan, points: Any, *, tests: Float[ndarray, "space tests"] | None = None
+) -> Result | list[Result]:
     """Barankin bound on the variance of unbiased estimators at given places.
 
     Parameters
@@ -123,9 +119,7 @@ def barankin(plan: Plan, points: Any, *, tests: Float[ndarray, "space tests"] | 
         matrix = barankin_matrix(H, gap @ law.whitener.T)
         where = "at (" + ", ".join(f"{x:g}" for x in place) + ")"
         diagnostics = {"tests_m": H, "point_m": place}
-        out.append(
-            static_result("barankin", matrix, verdict, "several test points", track=where, diagnostics=diagnostics)
-        )
+        out.append(static_result("barankin", matrix, verdict, "several test points", track=where, diagnostics=diagnostics))
     return out[0] if single else out
 
 

@@ -28,8 +28,7 @@ def verdict_of(id: str, plan: Plan, conditions: tuple[str, ...] = ()) -> Verdict
     found = method(id).verdict(plan, conditions)
     if found.status is Status.REFUSED:
         raise RefusedError(
-            f"{method(id).name} does not apply: {'; '.join(found.reasons)}",
-            f"locbounds explain {id} says what it needs",
+            f"{method(id).name} does not apply: {'; '.join(found.reasons)}", f"locbounds explain {id} says what it needs"
         )
     return found
 

@@ -63,9 +63,7 @@ class Likelihood(NamedTuple):
         """Deviations of the other channels if all are narrow angles with Gaussian noise, else None."""
         from locbounds.noise import Gaussian
 
-        if not all(
-            round_ and type(noise) is Gaussian and float(noise.std) < NARROW for _, noise, round_ in self.noises
-        ):
+        if not all(round_ and type(noise) is Gaussian and float(noise.std) < NARROW for _, noise, round_ in self.noises):
             return None
         return np.array([float(noise.std) for _, noise, _ in self.noises])
 
@@ -106,9 +104,7 @@ def likelihood(plan: Plan) -> Likelihood:
     periodic = np.asarray(plan.periodic)
     gaussian = np.asarray(plan.gaussian)
     linear = gaussian & ~periodic
-    precision = (
-        np.asarray(plan.precision)[np.ix_(linear[gaussian], linear[gaussian])] if linear.any() else np.zeros((0, 0))
-    )
+    precision = np.asarray(plan.precision)[np.ix_(linear[gaussian], linear[gaussian])] if linear.any() else np.zeros((0, 0))
     values, vectors = np.linalg.eigh(precision)
     keep = values > 1e-12 * max(values.max(initial=0.0), 1e-300)
     whitener = (vectors[:, keep] * np.sqrt(values[keep])).T

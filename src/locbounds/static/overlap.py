@@ -96,9 +96,7 @@ def disc_overlap(
     if high <= low:
         return empty(2)
     at = _moved(marks, shifts if rough is None else distinct(rough))
-    y, wy = _panels(
-        np.concatenate([*corners, at[:, 1]]), low, high, n, lambda y: np.subtract(*_chord(c, radius, y)[::-1])
-    )
+    y, wy = _panels(np.concatenate([*corners, at[:, 1]]), low, high, n, lambda y: np.subtract(*_chord(c, radius, y)[::-1]))
     if not len(y):
         return empty(2)
     left, right = _chord(c, radius, y)
@@ -174,9 +172,7 @@ def box_overlap(
         return empty(len(low))
     if len(marks):
         at = _moved(marks, shifts if rough is None else distinct(rough))
-        axes = [
-            _panels(np.concatenate([[a, b], at[:, k]]), a, b, n) for k, (a, b) in enumerate(zip(low, high, strict=True))
-        ]
+        axes = [_panels(np.concatenate([[a, b], at[:, k]]), a, b, n) for k, (a, b) in enumerate(zip(low, high, strict=True))]
     else:
         t, w = legendre(n)
         axes = [(a + s * t, s * w) for a, s in zip(low, size, strict=True)]

@@ -7,6 +7,7 @@ import numpy as np
 from locbounds.axes import Float, ndarray
 from locbounds.errors import InputError
 from locbounds.plan import Plan
+from locbounds.precision import double_precision
 from locbounds.priors import GaussianPrior, PositionPrior, UniformBox, UniformDisc, UniformPolygon
 from locbounds.static import support as supports
 from locbounds.static.overlap import polygon_overlap, shared_nodes

@@ -14,6 +14,8 @@ from locbounds.static.overlap import (
     box_overlap,
     disc_overlap,
     gaussian_overlap,
+    polygon_overlap,
+    shared_nodes,
 )
 
 REACH = 16.0  # deviations: two Gaussians so far apart have exp(-32) in common

@@ -120,9 +120,7 @@ def _beyond(h: ndarray, mse: ndarray, longest: float, support: Support) -> ndarr
     more = []
     if np.any(at == len(h) - 1) and h[-1] < 0.999 * longest:
         more.append(np.minimum(h[-1] * steps, 0.9999 * longest))
-    if np.any(at == 0) and h[0] > (1e-3 if support.whole else 1e-9) * np.sqrt(
-        np.linalg.eigvalsh(support.covariance)[0]
-    ):
+    if np.any(at == 0) and h[0] > (1e-3 if support.whole else 1e-9) * np.sqrt(np.linalg.eigvalsh(support.covariance)[0]):
         flat = support.whole and np.all(mse[at == 0, 0] <= mse[at == 0, min(1, len(h) - 1)] * (1 + 1e-7))
         if not flat:
             more.append(h[0] / steps)
@@ -314,12 +312,7 @@ def _lengths(lengths: Any) -> ndarray | None:
 
 def _vectors(tests: Any, space: int) -> ndarray:
     found = np.asarray(tests, float)
-    if (
-        found.ndim != 2
-        or found.shape[0] != space
-        or not np.all(np.isfinite(found))
-        or np.any(np.all(found == 0, axis=0))
-    ):
+    if found.ndim != 2 or found.shape[0] != space or not np.all(np.isfinite(found)) or np.any(np.all(found == 0, axis=0)):
         raise InputError(f"test vectors of shape {found.shape}", f"Give [{space}, points] metres, none of them zero")
     return found
 
@@ -394,8 +387,8 @@ def _any_exponent(
 
 def _limit(plan: Plan) -> ndarray | None:
     """The limit of short test vectors where it exists: the Bayesian Cramér-Rao matrix."""
-    from locbounds.bounds.bcrb_of_plan import bayesian_information
     from locbounds.registry import method
+    from locbounds.bounds.bcrb_of_plan import bayesian_information
     from locbounds.verdict import Status
 
     if method("bcrb").verdict(plan).status is not Status.VALID:

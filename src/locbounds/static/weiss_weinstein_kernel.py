@@ -78,7 +78,7 @@ class _Terms:
 def grams(
     support: Support, law: PairLaw, tests: Sequence[Float[ndarray, "space points"]], n: int, scales: Sequence[float]
 ) -> list[Gram]:
-    """Mu and q for several sets of test vectors."""
+    """mu and q for several sets of test vectors."""
     terms = _Terms(support, n)
     wanted = []
     for H in tests:
@@ -132,7 +132,7 @@ def with_exponent(
     n: int,
     scales: Sequence[float],
 ) -> list[Gram]:
-    """Mu and q for one exponent s in (0, 1) of all test vectors; Gaussian noise.
+    """mu and q for one exponent s in (0, 1) of all test vectors; Gaussian noise.
 
     ``psi_i = L^s(theta + h_i; theta) - L^(1-s)(theta - h_i; theta)``. Products of three Gaussian densities of one
     covariance with exponents a, b, c that sum to one integrate to exp(-(ab D_ab^2 + ac D_ac^2 + bc D_bc^2) / 2).

@@ -128,14 +128,7 @@ def ezzb(
         axes = (a / np.sqrt(weight))[None]
     support, law = support_of(prior, plan.anchors), pair_law(plan)
     found = over_axes(
-        support,
-        law,
-        axes,
-        [1.0],
-        free=shifts == "free",
-        valley=valley_filling,
-        equal=probabilities == "equal",
-        rtol=rtol,
+        support, law, axes, [1.0], free=shifts == "free", valley=valley_filling, equal=probabilities == "equal", rtol=rtol
     )
     known = found.axes_m2[0] * weight
     matrix = np.full((plan.dim, plan.dim), np.nan)

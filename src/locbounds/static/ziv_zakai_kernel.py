@@ -98,7 +98,9 @@ def along(
 ) -> Along:  # fmt: skip
     """The bound on the mean square error along a unit vector, for several noise levels."""
     if free and len(scales) > 1:
-        each = [along(support, law, a, n, [s], free=True, valley=valley, equal=equal, rtol=rtol) for s in scales]
+        each = [
+            along(support, law, a, n, [s], free=True, valley=valley, equal=equal, rtol=rtol) for s in scales
+        ]
         h = np.unique(np.concatenate([e.h_m for e in each]))
         filled = np.array([np.interp(h, e.h_m, e.filled[0]) for e in each])
         return Along(*(np.concatenate([getattr(e, f) for e in each]) for f in ("mse_m2", "error_m2")), h, filled)
@@ -183,7 +185,9 @@ def _width(support: Support, a: ndarray) -> float:
     if support.whole:
         return longest * np.sqrt(float(a @ support.covariance @ a) * float(a @ np.linalg.solve(support.covariance, a)))
     angles = np.linspace(-1, 1, 181)[1:-1] * np.pi / 2
-    return max(longest, *(support.reach(np.cos(t) * a + np.sin(t) * b) * np.cos(t) for b in basis for t in angles))
+    return max(
+        longest, *(support.reach(np.cos(t) * a + np.sin(t) * b) * np.cos(t) for b in basis for t in angles)
+    )
 
 
 def _free_offsets(
