@@ -102,13 +102,17 @@ class Walk(NamedTuple):
         velocity = (self.positions[1] - self.positions[0]) / self.step_s
         spread = np.array([position_std_m] * 2 + [velocity_std_m_s] * 2)
         prior = GaussianPrior(np.append(self.positions[0], velocity), np.diag(spread**2))
-        made = [self._link(m, std_m, std_m if nlos_std_m is None else nlos_std_m, levels) for m in range(len(links.names))]
+        made = [
+            self._link(m, std_m, std_m if nlos_std_m is None else nlos_std_m, levels) for m in range(len(links.names))
+        ]
         return Scenario(title, times, ConstantVelocity(psd_m2_s3), prior, made)
 
     def _link(self, m: int, std_m: float, nlos_std_m: float, levels: int) -> Link:
         blocked, excess = self.links.sight[1:, m] == NLOS, self.links.excess_m[1:, m]
         modes, noises = np.zeros(len(blocked), int), [Gaussian(0.0, std_m)]
-        edges = np.quantile(excess[blocked], np.linspace(0, 1, levels + 1)[1:-1]) if blocked.any() else np.zeros(levels - 1)
+        edges = (
+            np.quantile(excess[blocked], np.linspace(0, 1, levels + 1)[1:-1]) if blocked.any() else np.zeros(levels - 1)
+        )
         level = np.searchsorted(edges, excess, side="right")
         for k in range(levels):
             mine = blocked & (level == k)
@@ -195,7 +199,9 @@ def street_walk(
     along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1)))
     at = np.arange(int(np.floor(along[-1] / (speed_m_s * step_s) + 1e-9)) + 1) * speed_m_s * step_s
     if len(at) < 2:
-        raise InputError(f"the walk of {along[-1]:.1f} m is shorter than one step", "Give more waypoints or shorter steps")
+        raise InputError(
+            f"the walk of {along[-1]:.1f} m is shorter than one step", "Give more waypoints or shorter steps"
+        )
     positions = np.stack([np.interp(at, along, corners[:, axis]) for axis in (0, 1)], axis=1)
     inside = city.inside(positions)
     positions[inside] = corners[np.searchsorted(along, at[inside])]  # rounding beside a wall
