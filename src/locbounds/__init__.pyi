@@ -64,6 +64,8 @@ from .scenario import Link, Scenario
 from .scoring import Score, score
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
+from .static.street_map import cell_bounds, street_map
+from .static.street_raster import raster_ezzb, raster_mmse, raster_wwb, street_raster
 from .street_walk import Walk, street_walk
 from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
@@ -147,6 +149,7 @@ __all__ = [
     "bcrb_algorithm1",
     "bcrb_block_tridiagonal",
     "bhattacharyya",
+    "cell_bounds",
     "comply",
     "discrete_mmse",
     "enumer",
@@ -162,6 +165,9 @@ __all__ = [
     "papers",
     "plot",
     "quantile",
+    "raster_ezzb",
+    "raster_mmse",
+    "raster_wwb",
     "read_city",
     "read_links",
     "read_log",
@@ -173,6 +179,8 @@ __all__ = [
     "simulate",
     "street_cells",
     "street_links",
+    "street_map",
+    "street_raster",
     "street_walk",
     "survey_bound",
     "survey_model",

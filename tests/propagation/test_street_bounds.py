@@ -227,3 +227,24 @@ def test_bad_input_ends_with_two_and_leaves_nothing(files):
     assert "error: the 9 nearest of 4 anchors are wanted" in done.output
     assert "remedy: Give fewer" in done.output
     assert not (files / "out").exists()
+
+
+def test_courtyards_out_of_reach(files):
+    from locbounds.cli.map_city import map_city
+
+    yard = [[[0, 0], [30, 0], [30, 30], [0, 30], [0, 0]], [[5, 5], [5, 25], [25, 25], [25, 5], [5, 5]]]
+    features = [{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": r}} for r in [yard, *BLOCKS[1:]]]
+    (files / "blocks.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    inside = TEXT.replace("d = { position_m = [15, 15], roof = true }", "d = { position_m = [15, 15] }")
+    outside = TEXT.replace("d = { position_m = [15, 15], roof = true }", "d = { position_m = [15, -5] }")
+    closed = outside.replace("[-10, -10, 80, 80]", "[6, 6, 24, 24]")
+    for text, cause in (
+        (closed, "anchor a reaches no street point of the map"),
+        (outside.replace("[measure]", "courtyards = true\n[measure]"), "no anchor is in reach of the point"),
+    ):
+        (files / "city.toml").write_text(text)
+        with pytest.raises(lb.InputError, match=cause):
+            map_city(files / "city.toml", files / "out")
+    (files / "city.toml").write_text(inside)
+    map_city(files / "city.toml", files / "out")  # the anchor in the yard serves the yard only, which is no street
+    assert "unreached" in (files / "out" / "map.csv").read_text()

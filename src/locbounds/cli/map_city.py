@@ -55,7 +55,7 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
         )
         links = found.links
         streets = city.streets(_box(where), margin_m=keys.city.margin_m, courtyards=keys.city.courtyards)
-        if not keys.city.courtyards and not (np.array(found.status) != "building").any():
+        if keys.city.courtyards:
             links.refuse_unreached()
         cells = []
         for k, cell in enumerate(every := street_cells(streets, links.anchors, count=keys.measure.nearest)):

@@ -201,6 +201,18 @@ def weiss_weinstein(
     return [(float(np.sqrt(m)), np.exp(x) * reach, float(c)) for m, x, c in zip(fine, best, change, strict=True)]
 
 
+@double_precision
+def ziv_zakai(case: str, sigmas_m: Sequence[float]) -> list[float]:
+    """Extended Ziv-Zakai bound along and across the street: RMSE in metres per noise level."""
+    from locbounds.static.plan_laws import pair_law, support_of
+    from locbounds.static.ziv_zakai import over_axes
+
+    one = plan(case)
+    assert one.prior is not None
+    found = over_axes(support_of(one.prior), pair_law(one), np.eye(2), sigmas_m)
+    return [float(np.sqrt(axes.sum())) for axes in found.axes_m2]
+
+
 def fig8(
     sigmas_m: Sequence[float] = SIGMAS_M,
     *,
@@ -225,7 +237,6 @@ def fig8(
         Told what is being done.
     """
     from locbounds.static.mmse import mmse
-    from locbounds.static.ziv_zakai import ezzb
 
     rows = []
     for case in cases:
@@ -233,14 +244,46 @@ def fig8(
         for method, equal in (("wwb", False), ("wwb-equal", True)):
             found = weiss_weinstein(case, sigmas_m, equal=equal)
             rows += [Row(case, s, method, value, 0.0, True) for s, (value, _, _) in zip(sigmas_m, found, strict=True)]
+        announce(f"Fig. 8, {case.upper()}: Ziv-Zakai")
+        rows += [
+            Row(case, s, "ezzb", value, 0.0, True) for s, value in zip(sigmas_m, ziv_zakai(case, sigmas_m), strict=True)
+        ]
         for sigma in sigmas_m:
-            announce(f"Fig. 8, {case.upper()}, {sigma:g} m: Ziv-Zakai and least error")
-            here = plan(case, sigma)
-            for method, result in (("ezzb", ezzb(here)), ("mmse", mmse(here, rtol=rtol, seed=seed))):
-                value = float(np.sqrt(np.asarray(result.position_mse)).item())
-                error = value * result.relative_stderr()
-                rows.append(Row(case, sigma, method, value, float(error), True))
+            announce(f"Fig. 8, {case.upper()}, {sigma:g} m: least error")
+            least = mmse(plan(case, sigma), rtol=rtol, seed=seed)
+            value = float(np.sqrt(np.asarray(least.position_mse)).item())
+            rows.append(Row(case, sigma, "mmse", value, float(value * least.relative_stderr()), True))
     return rows
+
+
+def remarks(rows: Sequence[Row]) -> list[str]:
+    """The chapter's statements on this city, and what the computation finds.
+
+    Examples
+    --------
+    >>> rows = [Row("toa", 1.0, m, v, 0.01, True) for m, v in (("wwb", 4.0), ("mmse", 5.0))]
+    >>> remarks([*rows, *(row._replace(case="tdoa", rmse_m=row.rmse_m + 1) for row in rows)])[2]
+    'The chapter: TDoA is slightly worse than ToA. Computed: by 20.0 to 20.0 % in the least RMSE.'
+    """
+    found = statements()
+    known = {(row.case, row.sigma, row.method): row.rmse_m for row in rows}
+    sigmas = list(dict.fromkeys(row.sigma for row in rows))
+    cases = list(dict.fromkeys(row.case for row in rows))
+    tight = [known[c, s, "wwb"] / known[c, s, "mmse"] for c in cases for s in sigmas]
+    worse = [100 * (known["tdoa", s, "mmse"] / known["toa", s, "mmse"] - 1) for s in sigmas]
+    return [
+        "The chapter prints neither the layout of Fig. 7 nor the noise of Fig. 8: stations at every other crossing fit "
+        "its text.",
+        f"The chapter: only the nearest station has sight. Computed: it has on {found.nearest_los:.0%} of the streets, "
+        f"each of the other two on {found.other_los:.1%} (inside a crossing); all other links bend around one corner.",
+        f"The chapter: TDoA is slightly worse than ToA. Computed: by {_span(worse, '.1f')} % in the least RMSE.",
+        f"The chapter: the Weiss-Weinstein bound is fairly tight. Computed: {_span(tight, '.2f')} of the "
+        "least RMSE, with a length of its own along and across the street.",
+    ]
+
+
+def _span(values: Sequence[float], form: str) -> str:
+    return f"{min(values):{form}} to {max(values):{form}}"
 
 
 def fig8_csv(rows: Sequence[Row]) -> str:

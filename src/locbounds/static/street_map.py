@@ -116,8 +116,8 @@ class StreetMap(NamedTuple):
         left_out = free.count("boundary")
         return (
             "crlb: valid for unbiased estimators and points away from sight boundaries; refused at "
-            f"{left_out:,} of {len(free):,} street points ({left_out / max(len(free), 1):.0%}) where sight, last corner "
-            "or the set of nearest anchors changes nearby, so that the law of the ranges has no derivative. "
+            f"{left_out:,} of {len(free):,} street points ({left_out / max(len(free), 1):.0%}) where sight, last "
+            "corner or the set of nearest anchors changes nearby, so that the law of the ranges has no derivative. "
             "wwb and ezzb hold there too"
         )
 
@@ -169,6 +169,12 @@ def street_map(
     links = street_links(city, anchors, points, roof=roof)
     if links.inside.all():
         raise InputError("no point of the map lies on a street", "Choose another area or a smaller step")
+    deaf = (links.sight[~links.inside] == UNREACHED).all(axis=0)
+    if deaf.any():
+        raise InputError(
+            f"anchor {links.names[int(np.argmax(deaf))]} reaches no street point of the map",
+            "It stands in a courtyard without a way out: move it, or put it on the roof",
+        )
     if "tdoa" in measures and count < 2:
         raise InputError("time differences of a single anchor", "Use two nearest anchors at least")
     used = links.nearest(count)
