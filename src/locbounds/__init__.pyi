@@ -64,7 +64,7 @@ from .scenario import Link, Scenario
 from .scoring import Score, score
 from .sight import DwellSight, KnownSight, MarkovSight
 from .simulation import Draws, simulate
-from .static.street_map import cell_bounds, street_map
+from .static.street_map import cell_bounds, street_map, table_bounds
 from .static.street_raster import raster_ezzb, raster_mmse, raster_wwb, street_raster
 from .street_walk import Walk, street_walk
 from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
@@ -184,6 +184,7 @@ __all__ = [
     "street_walk",
     "survey_bound",
     "survey_model",
+    "table_bounds",
     "tdoa",
     "testing",
     "tightest",

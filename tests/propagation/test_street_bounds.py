@@ -116,14 +116,33 @@ def test_no_crlb_at_sight_boundaries():
     assert "refused at 1 of 2 street points (50%)" in found.verdict
 
 
-def test_a_table_of_links_gives_bounds():
-    p = grid(2.0, shapely.box(0, 0, 40, 8))
-    anchors = {"a": (-10.0, 4.0), "b": (50.0, 30.0)}
-    bias = np.stack([np.zeros(len(p)), 3.0 + 0.1 * p[:, 0]], 1)
-    table = LinkTable.of(p, anchors, (bias > 0).astype(int), bias, np.full(bias.shape, 1.5))
-    raster = street_raster(table.points, table.links.length_m, 1.5**2 * np.eye(2), step_m=table.step_m)
-    least = raster_mmse(raster)
-    assert 0 < raster_wwb(raster)[0] < least[0] + 3 * least[1]
+@pytest.mark.parametrize("measure", ["toa", "tdoa"])
+def test_a_table_of_links_is_as_good_as_the_geometry(measure):
+    region, anchors = shapely.box(0, 0, 40, 8), np.array([[-10.0, 4.0], [20.0, 30.0], [60.0, -20.0]])
+    city, p = City([shapely.box(0, 10, 40, 20)]), grid(1.0, region)
+    links = lb.street_links(city, anchors, p)
+    names = dict(zip("abc", anchors, strict=True))
+    table = LinkTable.of(p, names, links.sight, links.excess_m, np.full(links.sight.shape, 2.0))
+    cells = {c.nearest: c for c in lb.street_cells(region, anchors, count=3)}
+    found = lb.table_bounds(table, measure=measure)
+    assert sum(b.share for b in found) == pytest.approx(1.0)
+    for bounds in found:
+        same = cell_bounds(city, anchors, cells[bounds.nearest], std_m=2.0, measure=measure, step_m=1.0)
+        assert same is not None
+        assert bounds[3:] == pytest.approx(same[3:], rel=1e-9)
+
+
+def test_tables_with_too_few_links():
+    p = grid(1.0, shapely.box(0, 0, 5, 5))
+    sight = np.zeros((25, 2), int)
+    sight[3, 1] = -1
+    table = LinkTable.of(p, {"a": (9.0, 9.0), "b": (-9.0, 9.0)}, sight, np.zeros((25, 2)), np.ones((25, 2)))
+    with pytest.raises(lb.InputError, match=r"the point \(0.5, 3.5\) m receives 1 of the 2 anchors"):
+        lb.table_bounds(table, count=2)
+    assert lb.table_bounds(table, count=1)
+    for options in ({"count": 3}, {"count": 1, "measure": "tdoa"}, {"count": 1, "measure": "rss"}):
+        with pytest.raises(lb.InputError):
+            lb.table_bounds(table, **options)
 
 
 @pytest.mark.parametrize(
@@ -196,7 +215,9 @@ def test_the_program(files):
         ("d = { position_m = [15, 15], roof = true }", "d = { position_m = [15, 15] }", "inside building 0", "roof"),
         ("std_m = 3", "std_db = 3", "unknown key measure.std_db", "std_m"),
         ("std_m = 3", "std_m = -3", "measure.std_m", "standard deviation"),
-        ('buildings = "blocks.geojson"', "", "city.buildings is missing", "buildings.geojson"),
+        ('buildings = "blocks.geojson"', "", "neither buildings nor links_csv", "buildings.geojson"),
+        ("[measure]", 'links_csv = "links.csv"\n[measure]', "has buildings and links_csv", "one of them"),
+        ("std_m = 3", "", "measure.std_m is missing", "deviation"),
         ("blocks.geojson", "absent.geojson", "absent.geojson", "GeoJSON"),
         ("area_m = [-10, -10, 80, 80]", "area_m = [1, 1, 29, 29]", "no point of the map lies on a street", "area"),
         ("area_m = [-10, -10, 80, 80]", "area_m = [9, 9, 2, 2]", "area_m = [9", "four numbers"),
@@ -248,3 +269,22 @@ def test_courtyards_out_of_reach(files):
     (files / "city.toml").write_text(inside)
     map_city(files / "city.toml", files / "out")  # the anchor in the yard serves the yard only, which is no street
     assert "unreached" in (files / "out" / "map.csv").read_text()
+
+
+def test_the_program_with_a_table_of_links(files):
+    rows = ["x_m,y_m,anchor_id,sight,bias_m,deviation_m"]
+    for x in range(10):
+        for y in range(4):
+            rows += [
+                f"{x},{y},{a},{'los' if x < 5 else 'nlos'},{0 if x < 5 else 8},{1 if x < 5 else 2}" for a in "abcd"
+            ]
+    (files / "links.csv").write_text("\n".join(rows) + "\n")
+    text = TEXT.replace('buildings = "blocks.geojson"', 'links_csv = "links.csv"').replace("std_m = 3\n", "")
+    done = run(files, text)
+    assert done.exit_code == 0, done.output
+    assert "crlb: refused, a table of links has no derivatives" in done.output
+    assert (files / "out" / "cells.csv").read_text().startswith("anchors,share,measure")
+    (files / "links.csv").write_text("\n".join(rows[:-1]) + "\n")
+    done = run(files, text)
+    assert done.exit_code == 2
+    assert "links.csv has no link of (9, 3) m to d" in done.output

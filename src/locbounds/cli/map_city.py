@@ -32,7 +32,7 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
     """
     import numpy as np
 
-    from locbounds.cli.output import output_folder, print_json, print_table, status
+    from locbounds.cli.output import output_folder, print_json, status
     from locbounds.io.city_file import load_city
     from locbounds.propagation import street_cells
     from locbounds.report import city_plot
@@ -40,6 +40,10 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
     from locbounds.static import street_map as about
 
     file = load_city(path)
+    if file.table is not None:
+        return _map_table(file, path, out, seed=seed, json=json, force=force)
+    assert file.city is not None
+    assert file.keys.measure.std_m is not None
     keys, city, where = file.keys, file.city, file.bounds
     kinds, names = tuple(dict.fromkeys(keys.measure.kinds)), tuple(file.anchors)
     with output_folder(out, force=force) as folder, status("tracing paths") as say:
@@ -92,20 +96,48 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
             )  # fmt: skip
         for name, figure in pictures.items():
             folder.write(f"{name}.png", lambda target, figure=figure: figure.savefig(target, dpi=150))
-    overall = [_overall([c for c in cells if c.measure == kind], kind) for kind in kinds]
+    overall = _overall_rows(cells, kinds)
     if json:
         counts = {s or "value": found.status.count(s) for s in dict.fromkeys(found.status)}
         print_json({"overall": overall, "points": counts, "verdict": found.verdict, "notes": city.notes})
         return
-    rows = [[o["measure"], *(f"{o[k]:.2f} m" for k in ("wwb_m", "ezzb_m", "tightest_m")), _least(o)] for o in overall]
-    print_table(
-        f"{title}: position RMSE over all streets, from the {keys.measure.nearest} nearest of {len(names)} anchors",
-        ["", "wwb", "ezzb", "tightest", "least possible"],
-        rows,
-    )
+    _print_overall(overall, title, keys.measure.nearest, names)
     for text in (found.verdict, *city.notes):
         typer.echo(text)
     typer.echo(f"\nwrote {', '.join(str(p) for p in folder.written)}")
+
+
+def _map_table(file: Any, path: Path, out: Path, *, seed: int, json: bool, force: bool) -> None:
+    """Bounds from a ray tracer's links: no map of the Cramér-Rao bound, since a table has no derivatives."""
+    from locbounds.cli.output import output_folder, print_json, status
+    from locbounds.report.tables import csv_text
+    from locbounds.static.street_map import table_bounds
+
+    measure, kinds = file.keys.measure, tuple(dict.fromkeys(file.keys.measure.kinds))
+    with output_folder(out, force=force) as folder, status("bounds of the links in the table"):
+        cells = [b for k in kinds for b in table_bounds(file.table, count=measure.nearest, measure=k, seed=seed)]
+        folder.write_text("cells.csv", csv_text(CELL_COLUMNS, [_cell_row(c, file.table.names) for c in cells]))
+    overall, verdict = (
+        _overall_rows(cells, kinds),
+        "crlb: refused, a table of links has no derivatives; wwb and ezzb hold",
+    )
+    if json:
+        print_json({"overall": overall, "verdict": verdict})
+        return
+    _print_overall(overall, file.keys.title or path.stem, measure.nearest, file.table.names)
+    typer.echo(f"{verdict}\n\nwrote {', '.join(str(p) for p in folder.written)}")
+
+
+def _overall_rows(cells: list[Any], kinds: tuple[str, ...]) -> list[dict[str, Any]]:
+    return [_overall([c for c in cells if c.measure == kind], kind) for kind in kinds]
+
+
+def _print_overall(overall: list[dict[str, Any]], title: str, nearest: int, names: tuple[str, ...]) -> None:
+    from locbounds.cli.output import print_table
+
+    rows = [[o["measure"], *(f"{o[k]:.2f} m" for k in ("wwb_m", "ezzb_m", "tightest_m")), _least(o)] for o in overall]
+    heading = f"{title}: position RMSE over all streets, from the {nearest} nearest of {len(names)} anchors"
+    print_table(heading, ["", "wwb", "ezzb", "tightest", "least possible"], rows)
 
 
 CELL_COLUMNS = ("anchors", "share", "measure", "wwb_m", "ezzb_m", "tightest_m", "mmse_m", "mmse_stderr_m")

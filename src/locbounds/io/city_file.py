@@ -13,9 +13,10 @@ from locbounds.errors import InputError
 from locbounds.io.anchors_csv import read_anchors
 from locbounds.io.complain import quoted, unknown_key_remedy
 from locbounds.io.footprints import read_city
+from locbounds.io.link_table import read_links
 from locbounds.io.schema import Section, key, needed
 from locbounds.io.values import Numbers, Point, Positive, Text, Whole, fail
-from locbounds.propagation import City
+from locbounds.propagation import City, LinkTable
 from locbounds.propagation.city import GAP_M
 
 STEP_M, BOUND_STEP_M = 5.0, 3.0
@@ -24,13 +25,23 @@ STEP_M, BOUND_STEP_M = 5.0, 3.0
 class CitySection(Section):
     """The buildings and the streets between them."""
 
-    buildings: Text = needed('GeoJSON file of the footprints in metres, buildings = "buildings.geojson"')
+    buildings: Text | None = key('GeoJSON file of the footprints in metres, buildings = "buildings.geojson"')
+    links_csv: Text | None = key("instead: a ray tracer's links, x_m, y_m, anchor_id, sight, bias_m, deviation_m")
     gap_m: float = key("footprints closer than this are one wall", GAP_M)
     margin_m: float = key("distance from the walls at which streets begin", 0.0)
     courtyards: bool = key("whether courtyards without a way out count as streets", False)
     area_m: Numbers | None = key("rectangle of the map, [smallest x, smallest y, largest x, largest y]")
     step_m: Positive = key("side of the cells of the map", STEP_M)
     bound_step_m: Positive = key("side of the cells on which wwb, ezzb and the least error are summed", BOUND_STEP_M)
+
+    @model_validator(mode="after")
+    def _one_source(self):
+        if len(given := self.given("buildings", "links_csv")) != 1:
+            raise fail(
+                f"has {' and '.join(given) or 'neither buildings nor links_csv'}",
+                'Give one of them: buildings = "buildings.geojson", or links_csv = "links.csv"',
+            )
+        return self
 
     @model_validator(mode="after")
     def _rectangle(self):
@@ -46,7 +57,7 @@ class MeasureSection(Section):
     kinds: tuple[Literal["toa", "tdoa"], ...] = key(
         'times of arrival, their differences, or both: ["toa", "tdoa"]', ("toa",)
     )
-    std_m: Positive = needed("standard deviation of a time of arrival in metres, std_m = 5")
+    std_m: Positive | None = key("standard deviation of a time of arrival in metres, std_m = 5; in links_csv per link")
     nearest: Whole = key("how many nearest anchors measure the mobile", 3)
 
 
@@ -72,14 +83,16 @@ class CityFile(NamedTuple):
     """A city file with everything that it names."""
 
     keys: CityFileKeys
-    city: City
+    city: City | None
+    table: LinkTable | None
     anchors: dict[str, tuple[float, float]]
     roof: tuple[str, ...]
 
     @property
     def bounds(self) -> tuple[float, ...]:
         """The rectangle of the map."""
-        return tuple(float(v) for v in (self.keys.city.area_m or self.city.bounds))
+        bounds = self.keys.city.area_m or (() if self.city is None else self.city.bounds)
+        return tuple(float(v) for v in bounds)
 
 
 def is_city_file(path: str | os.PathLike) -> bool:
@@ -138,8 +151,16 @@ def load_city(path: str | os.PathLike) -> CityFile:
         places[name] = anchor.position_m
     if not places:
         raise InputError(f"{path.name} has no anchors", "Add [anchors] with a line NAME = { position_m = [x, y] } each")
+    roofs = tuple(name for name, anchor in keys.anchors.items() if anchor.roof)
+    if keys.city.links_csv is not None:
+        return CityFile(keys, None, read_links(path.parent / keys.city.links_csv, places), places, roofs)
+    assert keys.city.buildings is not None
+    if keys.measure.std_m is None:
+        raise InputError(
+            f"{path.name}: measure.std_m is missing", "Add std_m: deviation of a time of arrival in metres"
+        )
     city = read_city(path.parent / keys.city.buildings, gap_m=keys.city.gap_m)
-    return CityFile(keys, city, places, tuple(name for name, anchor in keys.anchors.items() if anchor.roof))
+    return CityFile(keys, city, None, places, roofs)
 
 
 def _complain(error: ValidationError, source: str) -> InputError:

@@ -7,9 +7,9 @@ import numpy as np
 
 from locbounds.axes import LOS, Bool, Float, Int, ndarray
 from locbounds.errors import InputError
-from locbounds.propagation import City, Links, StreetCell, street_links
+from locbounds.propagation import City, Links, LinkTable, StreetCell, street_links
 from locbounds.propagation.links import UNREACHED
-from locbounds.static.street_raster import raster_ezzb, raster_mmse, raster_wwb, street_raster
+from locbounds.static.street_raster import FEWEST, raster_ezzb, raster_mmse, raster_wwb, street_raster
 
 MEASURES = ("toa", "tdoa")
 BOUNDARY_M = 0.5
@@ -244,15 +244,95 @@ def cell_bounds(
     length = street_links(city, mine, points, roof=roof).length_m
     reached = np.isfinite(length).all(axis=1)
     points, length = points[reached], length[reached]
-    if len(points) < 9:
+    if len(points) < FEWEST:
         return None
     covariance = std_m**2 * np.eye(len(mine))
+    return _bounds(points, length, covariance, cell.nearest, cell.share, measure, step_m, draws, seed)
+
+
+def _bounds(
+    points: Float[ndarray, "points 2"],
+    length: Float[ndarray, "points used"],
+    covariance: Any,
+    nearest: tuple[int, ...],
+    share: float,
+    measure: str,
+    step_m: float,
+    draws: int,
+    seed: int,
+) -> CellBounds:
+    """Bounds from times of arrival, or their differences to the first anchor, on the cells of a raster."""
     if measure == "tdoa":
-        F = np.eye(len(mine))[1:] - np.eye(len(mine))[0]
+        F = np.eye(len(nearest))[1:] - np.eye(len(nearest))[0]
         length, covariance = length @ F.T, F @ covariance @ F.T
     raster = street_raster(points, length, covariance, step_m=step_m)
     least = raster_mmse(raster, draws=draws, seed=seed)
-    return CellBounds(cell.nearest, cell.share, measure, raster_wwb(raster)[0], raster_ezzb(raster)[0], *least)
+    return CellBounds(nearest, share, measure, raster_wwb(raster)[0], raster_ezzb(raster)[0], *least)
+
+
+def table_bounds(
+    table: LinkTable, *, count: int = 3, measure: str = "toa", draws: int = 2000, seed: int = 0
+) -> list[CellBounds]:
+    """Bounds from a ray tracer's table of links, for every set of the ``count`` nearest anchors.
+
+    Parameters
+    ----------
+    table
+        Its points are the centres of the streets' cells; biases and deviations are taken as constant on each.
+    count
+        How many anchors measure the mobile: of those that are received at its place, the nearest by straight distance.
+    measure
+        ``"toa"`` or ``"tdoa"``.
+    draws, seed
+        Of the least error.
+
+    Returns
+    -------
+    list of CellBounds
+        Sets that serve fewer than nine cells are left out.
+
+    Raises
+    ------
+    InputError
+        If a point receives fewer anchors than that, or the points are on no raster.
+
+    Examples
+    --------
+    >>> x = np.arange(0.5, 40.0)
+    >>> none, place = np.zeros((40, 1)), {"a": (-5, 0)}
+    >>> table = LinkTable.of(np.stack([x, 0 * x], axis=1), place, none, bias_m=none, deviation_m=none + 1)
+    >>> [bounds] = table_bounds(table, count=1)
+    >>> bounds.share, bool(bounds.tightest_m < bounds.mmse_m)
+    (1.0, True)
+    """
+    if measure not in MEASURES:
+        raise InputError(f"the measure is {measure}", f"Choose from {', '.join(MEASURES)}")
+    heard = (table.sight != UNREACHED).sum(axis=1)
+    if not 1 + (measure == "tdoa") <= count <= len(table.anchors):
+        raise InputError(f"the {count} nearest of {len(table.anchors)} anchors are wanted", "Give another number")
+    if (heard < count).any():
+        x, y = table.points[int(np.argmin(heard))]
+        raise InputError(
+            f"the point ({x:g}, {y:g}) m receives {heard.min()} of the {count} anchors that are to measure it "
+            f"(and {int((heard < count).sum()) - 1:,} more points)",
+            "Use fewer anchors, or leave such points out",
+        )
+    links = table.links
+    distance = np.where(table.sight == UNREACHED, np.inf, links.distance_m)
+    order = np.argsort(distance, axis=1, kind="stable")[:, :count]
+    sets = np.concatenate([order[:, :1], np.sort(order[:, 1:], axis=1)], axis=1)
+    found, step = [], table.step_m
+    for row in np.unique(sets, axis=0):
+        mine = np.flatnonzero((sets == row).all(axis=1))
+        if len(mine) < FEWEST:
+            continue
+        covariance = table.deviation_m[mine][:, row][:, :, None] ** 2 * np.eye(count)
+        if (covariance == covariance[0]).all():
+            covariance = covariance[0]
+        nearest, share = tuple(int(k) for k in row), len(mine) / len(sets)
+        length = links.length_m[mine][:, row]
+        found.append(_bounds(table.points[mine], length, covariance, nearest, share, measure, step, draws, seed))
+    return found
 
 
 def over_cells(cells: list[CellBounds], value: Callable[[CellBounds], float]) -> float:
