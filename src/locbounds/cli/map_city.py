@@ -43,7 +43,8 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
     if file.table is not None:
         return _map_table(file, path, out, seed=seed, json=json, force=force)
     assert file.city is not None
-    assert file.keys.measure.std_m is not None
+    std_m = file.keys.measure.std_m
+    assert std_m is not None
     keys, city, where = file.keys, file.city, file.bounds
     kinds, names = tuple(dict.fromkeys(keys.measure.kinds)), tuple(file.anchors)
     with output_folder(out, force=force) as folder, status("tracing paths") as say:
@@ -52,7 +53,7 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
             city,
             file.anchors,
             points,
-            std_m=keys.measure.std_m,
+            std_m=std_m,
             count=keys.measure.nearest,
             roof=file.roof,
             measures=kinds,
@@ -66,7 +67,7 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
             for kind in kinds:
                 say(f"bounds: {k + 1} of {len(every)} sets of anchors, {kind}")
                 got = about.cell_bounds(
-                    city, links.anchors, cell, std_m=keys.measure.std_m, measure=kind, step_m=keys.city.bound_step_m,
+                    city, links.anchors, cell, std_m=std_m, measure=kind, step_m=keys.city.bound_step_m,
                     roof=[str(i + 1) for i, m in enumerate(cell.nearest) if names[m] in file.roof], seed=seed,
                 )  # fmt: skip
                 cells += [got] if got else []
@@ -146,7 +147,8 @@ CELL_COLUMNS = ("anchors", "share", "measure", "wwb_m", "ezzb_m", "tightest_m", 
 def _box(bounds: tuple[float, ...]) -> Any:
     import shapely
 
-    return shapely.box(*bounds)
+    xmin, ymin, xmax, ymax = bounds
+    return shapely.box(xmin, ymin, xmax, ymax)
 
 
 def _columns(kinds: tuple[str, ...]) -> tuple[str, ...]:

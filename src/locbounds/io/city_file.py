@@ -85,7 +85,7 @@ class CityFile(NamedTuple):
     keys: CityFileKeys
     city: City | None
     table: LinkTable | None
-    anchors: dict[str, tuple[float, float]]
+    anchors: dict[str, tuple[float, ...]]
     roof: tuple[str, ...]
 
     @property
@@ -164,7 +164,7 @@ def load_city(path: str | os.PathLike) -> CityFile:
 
 
 def _complain(error: ValidationError, source: str) -> InputError:
-    first = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
+    first: Any = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
     location: tuple[Any, ...] = first["loc"]
     model: Any = CityFileKeys
     for part in location[:-1]:

@@ -43,7 +43,7 @@ def read_links(path: str | os.PathLike, anchors: Any) -> LinkTable:
     >>> read_links(path, {"bs": (0.0, 0.0)}).sight.tolist()
     [[1], [-1]]
     """
-    table = CsvTable(path, "links")
+    table = CsvTable(Path(path), "links")
     for column in COLUMNS:
         table.need(column, column)
     known = anchors if isinstance(anchors, dict) else read_anchors(anchors)
