@@ -15,6 +15,8 @@ from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
 from .filters import EkfBanks, Estimates, FactorisedImmEkf, ImmEkf, ImmKf, ImmKfSmoother, OracleEkf, Rbpf
 from .fit.scenario import fit_scenario
+from .io.footprints import read_city
+from .io.link_table import read_links
 from .io.logs import read_log
 from .io.plans import read_plan
 from .io.scenario_file import load, save
@@ -43,6 +45,17 @@ from .noise import (
 )
 from .plan import Observations, Plan, aoa, observe, rss, tdoa, toa
 from .priors import DensityPrior, GaussianPrior, PriorMixture, Prism, UniformBox, UniformDisc, UniformPolygon
+from .propagation import (
+    Building,
+    City,
+    Links,
+    LinkTable,
+    StreetCell,
+    StreetRanges,
+    street_cells,
+    street_links,
+    uniform_on,
+)
 from .reference import reference
 from .registry import explain
 from .report import plot
@@ -60,9 +73,12 @@ from .static.estimators import ls, ml
 from .static.maps import AccuracyMap
 from .static.mmse import mmse
 from .static.noise_levels import bounds_over_noise
+from .static.street_map import cell_bounds, street_map, table_bounds
+from .static.street_raster import raster_ezzb, raster_mmse, raster_wwb, street_raster
 from .static.tightest import Tightest, tightest
 from .static.weiss_weinstein import wwb
 from .static.ziv_zakai import ezzb
+from .street_walk import Walk, street_walk
 from .survey import Fingerprints, discrete_mmse, survey_bound, survey_model
 from .times import Times
 
@@ -72,7 +88,9 @@ __all__ = [
     "AdditiveChannel",
     "AlongTrack",
     "Bearing",
+    "Building",
     "BySight",
+    "City",
     "ConstantAcceleration",
     "ConstantVelocity",
     "CoordinatedTurn",
@@ -106,6 +124,8 @@ __all__ = [
     "Laplace",
     "LinearMotion",
     "Link",
+    "LinkTable",
+    "Links",
     "LocboundsError",
     "LogNormal",
     "MarkovSight",
@@ -127,6 +147,8 @@ __all__ = [
     "Scenario",
     "Score",
     "Singularity",
+    "StreetCell",
+    "StreetRanges",
     "StudentT",
     "SwitchingMotion",
     "Tightest",
@@ -136,6 +158,7 @@ __all__ = [
     "UniformBox",
     "UniformDisc",
     "UniformPolygon",
+    "Walk",
     "aoa",
     "barankin",
     "bcrb",
@@ -143,6 +166,7 @@ __all__ = [
     "bcrb_block_tridiagonal",
     "bhattacharyya",
     "bounds_over_noise",
+    "cell_bounds",
     "comply",
     "crlb",
     "discrete_mmse",
@@ -165,6 +189,11 @@ __all__ = [
     "papers",
     "plot",
     "quantile",
+    "raster_ezzb",
+    "raster_mmse",
+    "raster_wwb",
+    "read_city",
+    "read_links",
     "read_log",
     "read_plan",
     "read_survey",
@@ -173,11 +202,18 @@ __all__ = [
     "save",
     "score",
     "simulate",
+    "street_cells",
+    "street_links",
+    "street_map",
+    "street_raster",
+    "street_walk",
     "survey_bound",
     "survey_model",
+    "table_bounds",
     "tdoa",
     "testing",
     "tightest",
     "toa",
+    "uniform_on",
     "wwb",
 ]

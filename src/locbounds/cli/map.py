@@ -8,10 +8,12 @@ import typer
 from locbounds.cli.options import ForceOption, JsonOption, OutOption, SeedOption, default_out
 
 DEFAULT_METHODS = "bcrb,wwb,ezzb,mmse"
+PLAN_OPTIONS = ("grid", "cells", "methods", "share", "weights", "rtol")
 
 
 def map_command(
-    plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="Plan file.", show_default=False)],
+    context: typer.Context,
+    plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="Plan file or city file.", show_default=False)],
     grid: Annotated[int, typer.Option("--grid", metavar="N", help="Points along the longer side.")] = 101,
     cells: Annotated[
         int, typer.Option("--cells", metavar="N", min=0, help="Cells along the longer side, for Bayesian numbers.")
@@ -38,14 +40,26 @@ def map_command(
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> None:
-    """What accuracy is possible over an area: Cramér-Rao bound, GDOP, CEP; Bayesian bounds and the least error.
+    r"""What accuracy is possible over an area: Cramér-Rao bound, GDOP, CEP; Bayesian bounds and the least error.
 
     Writes map.csv and map.nc (every point), methods.csv (numbers over the prior with their verdicts), cells.csv (the
     same for a device known to be in one cell), map.png and cells.png. An example to edit: locbounds new plan.toml
     --like plan.
 
+    A city file, with a section \\[city] that names the footprints of buildings, says everything itself: of the options
+    above it takes --out, --seed, --json and --force. Writes map.csv (every street point), cells.csv (bounds per set of
+    nearest anchors), sight.png, excess.png, toa.png or tdoa.png.
+
     [bold]Example[/bold]: locbounds map plan.toml
     """
+    from locbounds.io.city_file import is_city_file
+
+    if is_city_file(plan):
+        from locbounds.cli.map_city import map_city
+
+        _refuse_plan_options(context)
+        map_city(plan, default_out(plan, out), seed=seed, json=json, force=force)
+        return
     map_plan(
         plan,
         default_out(plan, out),
@@ -59,6 +73,15 @@ def map_command(
         json=json,
         force=force,
     )
+
+
+def _refuse_plan_options(context: typer.Context) -> None:
+    """Raise an InputError if an option was given that a city file does not take."""
+    from locbounds.errors import InputError
+
+    given = [name for name in PLAN_OPTIONS if getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"]
+    if given:
+        raise InputError(f"--{given[0]} is for plan files, this is a city file", "Its keys say what is computed")
 
 
 def map_plan(

@@ -56,7 +56,8 @@ def paper(
     fritsche2013 writes table1.csv, fig1.csv and fig1.png; after Ctrl-C the finished columns of Table I in
     partial-table1.csv. The table on the screen compares every published entry with the computed one. chen2010 writes
     fig1 and fig2 (csv, png), quantiles.csv, segments.csv, settings.csv, bounds.csv and requirement.csv, and says which
-    statements of the paper hold. mcguire2009 writes fig3 to fig6 and, given the measured surveys, fig9 (csv, png).
+    statements of the paper hold. mcguire2009 writes fig3 to fig6 and fig8 (csv, png), fig7.png
+    and, given the measured surveys, fig9 (csv, png).
 
     [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
     """

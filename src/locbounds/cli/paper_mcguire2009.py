@@ -17,7 +17,7 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
     wanted = _wanted(figures, data)
     if "fig9" in wanted:
         study.data_folder(data)
-    simple = [name for name in wanted if name != "fig9"]
+    simple = [name for name in wanted if name in set(study.FIGURE_OF.values())]
     found, surveys = {}, {}
     with status("mcguire2009: starting") as say:
         for name in simple:
@@ -25,12 +25,21 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
             folder.write_text(f"{name}.csv", study.figure_csv(rows))
             figure = study.simple_figure(rows)
             folder.write(f"{name}.png", lambda path, figure=figure: figure.savefig(path, dpi=150))
+        if "fig7" in wanted:
+            plot = study.fig7_figure()
+            folder.write("fig7.png", lambda path: plot.savefig(path, dpi=150))
+        said = study.statements(found)
+        if "fig8" in wanted:
+            rows = found["fig8"] = study.fig8(seed=seed, announce=say)
+            folder.write_text("fig8.csv", study.figure_csv(rows))
+            curves = study.fig8_figure(rows)
+            folder.write("fig8.png", lambda path: curves.savefig(path, dpi=150))
+            said += study.street_statements(rows)
         if "fig9" in wanted:
             surveys = study.fig9(data, seed=seed, announce=say)
             folder.write_text("fig9.csv", study.fig9_csv(surveys))
             figure = study.fig9_figure(surveys)
             folder.write("fig9.png", lambda path: figure.savefig(path, dpi=150))
-        said = study.statements(found)
         if "fig3" in found:
             say("Fig. 3: maximum likelihood")
             said.insert(2, study.on_maximum_likelihood(seed=seed))
@@ -55,10 +64,10 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
         typer.echo("What the chapter says (its figures' numbers are not printed):")
     for s in said:
         typer.echo(f"- {s.paper}\n  {s.verdict}: {s.why}")
-    if found:
+    if simple:
         typer.echo(
-            "\nCRLB and BCRB are no bounds here: the prior ends at the rim, and estimators that know it are biased. They "
-            "are the mean\nof the local bound (infinite for TDoA with stations inside) and the inverse of the mean "
+            "\nCRLB and BCRB are no bounds here: the prior ends at the rim, and estimators that know it are biased. "
+            "They are the mean\nof the local bound (infinite for TDoA with stations inside) and the inverse of the mean "
             "information (zero for RSS and AoA).\n"
         )
     if surveys:

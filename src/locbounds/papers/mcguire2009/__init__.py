@@ -1,6 +1,7 @@
 """McGuire and Plataniotis, "Accuracy bounds for wireless localization methods" (book chapter, 2009).
 
-Figs. 3 to 6: bounds and least error of a simple static scenario. Fig. 9: what a survey of signal strengths tells.
+Figs. 3 to 6: bounds and least error of a simple static scenario. Figs. 7 and 8: terminals in the streets of a dense
+city (:mod:`~locbounds.papers.mcguire2009.streets`). Fig. 9: what a survey of signal strengths tells.
 """
 
 from locbounds.papers.mcguire2009.simple import (
@@ -14,6 +15,7 @@ from locbounds.papers.mcguire2009.simple import (
     simple_study,
 )
 from locbounds.papers.mcguire2009.statements import Statement, on_maximum_likelihood, statements
+from locbounds.papers.mcguire2009.streets import fig7_figure, fig8, fig8_figure, street_statements
 from locbounds.papers.mcguire2009.survey_set import (
     DATA,
     PUBLISHED_FIG9,
@@ -27,7 +29,7 @@ from locbounds.papers.mcguire2009.survey_set import (
     fig9_figure,
 )
 
-FIGURES = ("fig3", "fig4", "fig5", "fig6", "fig9")
+FIGURES = ("fig3", "fig4", "fig5", "fig6", "fig7", "fig8", "fig9")
 
 __all__ = [
     "CASES",
@@ -44,6 +46,9 @@ __all__ = [
     "SurveySet",
     "case_rows",
     "data_folder",
+    "fig7_figure",
+    "fig8",
+    "fig8_figure",
     "fig9",
     "fig9_csv",
     "fig9_figure",
@@ -52,4 +57,5 @@ __all__ = [
     "simple_figure",
     "simple_study",
     "statements",
+    "street_statements",
 ]
