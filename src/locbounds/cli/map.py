@@ -1,5 +1,6 @@
 """``locbounds map``: what accuracy is possible over an area."""
 
+import inspect
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,11 +9,9 @@ import typer
 from locbounds.cli.options import ForceOption, JsonOption, OutOption, SeedOption, default_out
 
 DEFAULT_METHODS = "bcrb,wwb,ezzb,mmse"
-PLAN_OPTIONS = ("grid", "cells", "methods", "share", "weights", "rtol")
 
 
 def map_command(
-    context: typer.Context,
     plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="Plan file or city file.", show_default=False)],
     grid: Annotated[int, typer.Option("--grid", metavar="N", help="Points along the longer side.")] = 101,
     cells: Annotated[
@@ -57,7 +56,7 @@ def map_command(
     if is_city_file(plan):
         from locbounds.cli.map_city import map_city
 
-        _refuse_plan_options(context)
+        _refuse_plan_options(grid=grid, cells=cells, methods=methods, share=share, weights=weights, rtol=rtol)
         map_city(plan, default_out(plan, out), seed=seed, json=json, force=force)
         return
     map_plan(
@@ -75,13 +74,13 @@ def map_command(
     )
 
 
-def _refuse_plan_options(context: typer.Context) -> None:
+def _refuse_plan_options(**given: Any) -> None:
     """Raise an InputError if an option was given that a city file does not take."""
     from locbounds.errors import InputError
 
-    given = [name for name in PLAN_OPTIONS if getattr(context.get_parameter_source(name), "name", "") == "COMMANDLINE"]
-    if given:
-        raise InputError(f"--{given[0]} is for plan files, this is a city file", "Its keys say what is computed")
+    for name, parameter in inspect.signature(map_plan).parameters.items():
+        if name in given and given[name] != parameter.default:
+            raise InputError(f"--{name} is for plan files, this is a city file", "Its keys say what is computed")
 
 
 def map_plan(

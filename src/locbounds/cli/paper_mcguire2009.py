@@ -66,9 +66,9 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
         typer.echo(f"- {s.paper}\n  {s.verdict}: {s.why}")
     if simple:
         typer.echo(
-            "\nCRLB and BCRB are no bounds here: the prior ends at the rim, and estimators that know it are biased. "
-            "They are the mean\nof the local bound (infinite for TDoA with stations inside) and the inverse of the mean "
-            "information (zero for RSS and AoA).\n"
+            "\nCRLB and BCRB are no bounds here: the prior ends at the rim; estimators that know it are biased. "
+            "They are the mean\nof the local bound (infinite for TDoA with stations inside) and the inverse of the "
+            "mean information (zero for RSS and AoA).\n"
         )
     if surveys:
         _print_fig9(surveys)
