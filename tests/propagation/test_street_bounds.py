@@ -190,9 +190,9 @@ def files(tmp_path):
     return tmp_path
 
 
-def run(folder, text):
+def run(folder, text, *options):
     (folder / "city.toml").write_text(text)
-    return CliRunner().invoke(app, ["map", str(folder / "city.toml"), "--out", str(folder / "out")])
+    return CliRunner().invoke(app, ["map", str(folder / "city.toml"), "--out", str(folder / "out"), *options])
 
 
 def test_the_program(files):
@@ -247,6 +247,9 @@ def test_bad_input_ends_with_two_and_leaves_nothing(files):
     assert done.exit_code == 2
     assert "error: the 9 nearest of 4 anchors are wanted" in done.output
     assert "remedy: Give fewer" in done.output
+    done = run(files, TEXT, "--grid", "50")
+    assert done.exit_code == 2
+    assert "error: --grid is for plan files" in done.output
     assert not (files / "out").exists()
 
 
