@@ -14,6 +14,12 @@ def no_prior(plan: Plan) -> str | None:
     return "the plan has no prior: nothing is averaged over" if plan.prior is None else None
 
 
+def mixed_units(plan: Plan) -> str | None:
+    """Which units the plan mixes, or None."""
+    units = dict.fromkeys(unit or "unknown" for unit in plan.units)
+    return f"squares of {', '.join(units)} cannot be summed without weights" if len(units) > 1 else None
+
+
 def irregular_prior(plan: Plan) -> str | None:
     """Why the prior has no finite information, or None."""
     if plan.prior is None:
@@ -69,6 +75,7 @@ def _comes_to(prior: Any, anchor: np.ndarray, *, vertical: bool) -> bool:
 
 
 WITH_PRIOR = Assumption("the plan has a prior", no_prior)
+ONE_UNIT = Assumption("all measurements have the same unit", mixed_units)
 REGULAR_PRIOR = Assumption("the prior's density vanishes smoothly where it ends", irregular_prior)
 CONTINUOUS = Assumption("every measurement is continuous over the places that the prior allows", discontinuous)
 FINITE_EXPECTATION = Assumption("the expected information is finite", diverging_information)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from locbounds.assumptions import COMMON
 from locbounds.errors import InputError
 from locbounds.plan import Plan
-from locbounds.plan_assumptions import BAYESIAN_PLAN, WITH_PRIOR
+from locbounds.plan_assumptions import BAYESIAN_PLAN, ONE_UNIT, WITH_PRIOR
 from locbounds.scenario import Scenario
 from locbounds.verdict import (
     DETERMINED,
@@ -346,7 +346,7 @@ METHODS: dict[str, Method] = {
             (),
             "Knows neither prior nor noise; wild where the geometry is poor.",
             ("mcguire2009",),
-            (WITH_PRIOR,),
+            (WITH_PRIOR, ONE_UNIT),
             subject="plan",
         ),
     )

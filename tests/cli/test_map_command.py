@@ -103,10 +103,10 @@ def test_json_and_netcdf_say_the_same(tmp_path):
 
 def test_a_plan_without_cramer_rao_bound_still_has_the_others(tmp_path):
     text = HALL.replace("{ std_m = 2 }", '{ family = "exponential", scale_m = 2 }')
-    done = run(text, *FAST, "--cells", "0", "--methods", "ezzb")
+    done = run(text, *FAST, "--cells", "0", "--methods", "wwb")
     assert done.exit_code == 0, done.output
     assert {r["method"]: r["verdict"] for r in rows(tmp_path / "hall-out" / "methods.csv")} == {
-        "crlb": "refused", "ezzb": "valid",
+        "crlb": "refused", "wwb": "valid",
     }  # fmt: skip
     assert not (tmp_path / "hall-out" / "map.csv").exists()
     assert run(text, *FAST, "--methods", "none", "--out", "again").exit_code == 2
@@ -118,6 +118,10 @@ def test_mixed_units_have_no_dilution_unless_weights_are_given(tmp_path):
     assert done.exit_code == 0, done.output
     assert "different units, and no weights are given" in done.output
     assert "gdop" not in rows(tmp_path / "hall-out" / "map.csv")[0]
+    done = run(text, *FAST, "--methods", "ls", "--cells", "0")
+    assert done.exit_code == 0, done.output
+    why = rows(tmp_path / "hall-out" / "methods.csv")[1]["why"]
+    assert why == "squares of m, rad cannot be summed without weights"
     done = run(text, *FAST, "--methods", "none", "--weights", "1,1,1500")
     assert done.exit_code == 0, done.output
     assert "gdop" in rows(tmp_path / "hall-out" / "map.csv")[0]
@@ -155,6 +159,7 @@ BOX = "low_m = [0, 0]\nhigh_m = [40, 20]"
         ("[anchors]", "[prior]\nposition_m = [0, 0]\nposition_std_m = inf\n[anchors]", [], ["position_std_m"]),
         ("b = { position_m = [40, 0] }\nc = { position_m = [20, 20] }", "", [], ["cannot determine"]),
         ("std_m", "std_db", [], ["std_db", "Did you mean std_m"]),
+        (BOX, "low_m = [0, 0]\nhigh_m = [1e12, 1e12]", [], ["the area reaches", "local plane"]),
         ("", "", ["--grid", "1"], ["grid is 1"]),
         ("", "", ["--grid", "99999"], ["At most"]),
         ("", "", ["--methods", "wbw"], ["unknown method 'wbw'", "Did you mean wwb"]),

@@ -234,7 +234,10 @@ REFUSED = {
 def test_every_assumption_has_a_plan_that_violates_it_and_a_verdict_that_says_so():
     ids = ("wwb", "ezzb", "mmse", "ml", "ls")
     assumptions = {a.text for a in METHODS["bcrb"].on_plan} | {a.text for id in ids for a in METHODS[id].assumptions}
-    assert assumptions == set(REFUSED)
+    assert assumptions == {*REFUSED, "all measurements have the same unit"}
+    mixed = lb.toa(ANCHORS[:2], 3.0, prior=DISC) + lb.aoa(ANCHORS[2:], 0.2)
+    with pytest.raises(lb.RefusedError, match="without weights"):
+        lb.ls(mixed)
     for text, (plan, words) in REFUSED.items():
         verdict = method("bcrb").verdict(plan)
         assert verdict.status is Status.REFUSED

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 OUTSIDE = -1
 MOST_POINTS = 4_000_000
+FARTHEST_M = 1e9
 
 
 class AccuracyMap:
@@ -183,7 +184,7 @@ def grid_of(area: PositionPrior, n: int) -> tuple[ndarray, ndarray, ndarray]:
     Raises
     ------
     InputError
-        If the grid is too fine, or no point of it is in the area.
+        If the grid is too fine, no point of it is in the area, or the area is larger than the Earth.
 
     Examples
     --------
@@ -195,6 +196,10 @@ def grid_of(area: PositionPrior, n: int) -> tuple[ndarray, ndarray, ndarray]:
     if n < 2 or int(n) != n:
         raise InputError(f"the grid is {n}", "Give a whole number of points along the longer side, at least 2")
     low, high = (np.asarray(corner)[:2] for corner in area.bounds())
+    if not np.max(np.abs([low, high])) < FARTHEST_M:
+        raise InputError(
+            f"the area reaches from {low.tolist()} to {high.tolist()}", "Give metres in a local plane, not degrees"
+        )
     sides = high - low
     counts = np.maximum(2, 1 + np.round((n - 1) * sides / sides.max()).astype(int))
     if counts.prod() > MOST_POINTS:
