@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import locbounds as lb
-from locbounds.io.plan_example import PLAN
 from locbounds.io import plans
+from locbounds.io.plan_example import PLAN
 
 HALL = """
 format = 1
