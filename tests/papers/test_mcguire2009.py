@@ -140,9 +140,8 @@ def test_statements_follow_the_numbers():
 
 def test_a_figure_through_the_shell(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("locbounds.papers.mcguire2009.simple.METRES", (3.0, 20.0))
-    monkeypatch.setattr("locbounds.papers.mcguire2009.simple.RTOL", 2e-3)
-    monkeypatch.setattr("locbounds.papers.mcguire2009.simple.MMSE_RTOL", 5e-3)
+    for name, value in (("METRES", (3.0, 20.0)), ("RTOL", 2e-3), ("MMSE_RTOL", 5e-3)):
+        monkeypatch.setitem(lb.papers.mcguire2009.case_rows.__globals__, name, value)
     done = CliRunner().invoke(app, ["paper", "mcguire2009", "--figures", "fig4"])
     assert done.exit_code == 0, done.output
     out = tmp_path / "mcguire2009-out"

@@ -66,8 +66,8 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
         typer.echo(f"- {s.paper}\n  {s.verdict}: {s.why}")
     if simple:
         typer.echo(
-            "\nCRLB and BCRB are no bounds here: the prior ends at the rim; estimators that know it are biased. "
-            "They are the mean\nof the local bound (infinite for TDoA with stations inside) and the inverse of the "
+            "\nCRLB and BCRB are no bounds here: the prior ends at the rim, and estimators that know it are biased.\n"
+            "They are the mean of the local bound (infinite for TDoA with stations inside) and the inverse of the\n"
             "mean information (zero for RSS and AoA).\n"
         )
     if surveys:
@@ -97,9 +97,15 @@ def _print_simple(name: str, rows: list[Any]) -> None:
         for row in rows:
             if row.case == case:
                 at.setdefault(row.sigma, {})[row.method] = row
-        cells = [[f"{sigma:g}", *(_cell(line[m]) for m in methods)] for sigma, line in at.items()]
+        cells = [[f"{sigma:g}", *(_cell(line[m]) for m in methods), _tightest(line)] for sigma, line in at.items()]
         marks = [m if next(iter(at.values()))[m].valid != "refused" else f"{m} (refused)" for m in methods]
-        print_table(f"Fig. {name[3:]}, {case}: position RMSE in m", ["sigma", *marks], cells)
+        print_table(f"Fig. {name[3:]}, {case}: position RMSE in m", ["sigma", *marks, "tightest"], cells)
+
+
+def _tightest(line: dict[str, Any]) -> str:
+    """The largest valid bound, and by how much it is above the next one."""
+    best, other = sorted((r for r in line.values() if r.valid == "valid"), key=lambda r: -r.rmse_m)[:2]
+    return f"{best.method}, {best.rmse_m / other.rmse_m - 1:.1%} above {other.method}"
 
 
 def _cell(row: Any) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from locbounds.axes import LOS, Bool, Float, ndarray
 from locbounds.propagation import City, Links
+from locbounds.report.plan_view import draw_anchors, scale_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 BUILDING, WALL = "#C9C4BB", "#8A847A"
 FREE, BLOCKED, STREET = "#0072B2", "#D55E00", "#E9F1E6"
-BARS_M = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000)
 
 
 def draw_buildings(panel: "Axes", city: City, *, bounds: Any = None, bar: bool = True) -> None:
@@ -57,31 +57,6 @@ def outline(polygon: Any) -> Any:
 
     rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
     return Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
-
-
-def scale_bar(panel: "Axes") -> None:
-    """A bar of a round length, about a fifth of the picture's width, in the lower right corner."""
-    from matplotlib.patches import Rectangle
-
-    (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
-    width, height = right - left, top - bottom
-    length = max((b for b in BARS_M if b <= 0.25 * width), default=1)
-    x, y = right - 0.04 * width - length, bottom + 0.035 * height
-    box = Rectangle((x - 0.02 * width, y - 0.02 * height), length + 0.04 * width, 0.075 * height)
-    box.set(facecolor="white", alpha=0.85, edgecolor="none", zorder=8)
-    panel.add_patch(box)
-    panel.add_patch(Rectangle((x, y), length, 0.008 * height, facecolor="black", edgecolor="none", zorder=9))
-    panel.text(x + length / 2, y + 0.014 * height, f"{length:g} m", ha="center", va="bottom", fontsize=8, zorder=9)
-
-
-def draw_anchors(panel: "Axes", anchors: Float[ndarray, "anchors 2"], names: Sequence[str]) -> None:
-    """Triangles with their names beside them."""
-    import matplotlib.patheffects as effects
-
-    panel.plot(*anchors.T, "^", color="black", mec="white", mew=0.8, ms=9, zorder=7, ls="", label="anchors")
-    for name, place in zip(names, anchors, strict=True):
-        text = panel.annotate(name, place, (6, 5), textcoords="offset points", fontsize=9, zorder=8, clip_on=True)
-        text.set_path_effects([effects.withStroke(linewidth=2.5, foreground="white")])
 
 
 def draw_paths(panel: "Axes", links: Links, pairs: Iterable[tuple[int, int]]) -> None:

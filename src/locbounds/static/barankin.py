@@ -67,7 +67,7 @@ def barankin(plan: Plan, points: Any, *, tests: Float[ndarray, "space tests"] | 
         One place [space] or several [points, space], in metres.
     tests
         Test vectors [space, tests] in metres; by default short ones along the axes, which give the Cramér-Rao bound,
-        and ten lengths in twelve directions, up to 34 deviations of it. Where the place cannot be told locally, lengths
+        and ten lengths in 24 directions, up to 34 deviations of it. Where the place cannot be told locally, lengths
         are relative to the distance of the anchors.
 
     Returns

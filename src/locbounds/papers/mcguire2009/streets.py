@@ -333,7 +333,8 @@ def fig7_figure() -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.patches import PathPatch
 
-    from locbounds.report.city_plot import draw_anchors, draw_buildings, draw_paths, outline
+    from locbounds.report.city_plot import draw_buildings, draw_paths, outline
+    from locbounds.report.plan_view import draw_anchors
 
     cell, places = stretch()
     whole = city(3)
@@ -348,8 +349,6 @@ def fig7_figure() -> Figure:
     panel.plot(*np.array(others).T, "^", color="0.55", mec="white", ms=8, ls="", zorder=7, label="other stations")
     draw_anchors(panel, places, ["nearest", "second", "third"])
     panel.plot([], [], "s", color="#F4D58D", label="where these three are nearest")
-    panel.set_title(
-        "Streets of 20 m between blocks of 300 m, stations at every other crossing", loc="left", fontsize=10
-    )
+    panel.set_title("Stations at every other crossing", loc="left", fontsize=10)
     figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     return figure
