@@ -1,11 +1,13 @@
 """Plan files: what they say, and what they say when they cannot be used."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import locbounds as lb
+from locbounds.io import plans
 from locbounds.io.plan_example import PLAN
-from locbounds.io.plans import read_plan, read_text
 
 HALL = """
 format = 1
@@ -21,6 +23,8 @@ a = { position_m = [0, 0] }
 b = { position_m = [40, 0] }
 c = { position_m = [20, 20] }
 """
+read_plan: Any = plans.read_plan  # what a file holds is of one kind or another
+read_text: Any = plans.read_text
 PLACES = np.array([[0.0, 0.0], [40.0, 0.0], [20.0, 20.0]])
 THERE = np.array([[11.0, 7.0], [30.0, 15.0]])
 

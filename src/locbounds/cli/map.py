@@ -109,7 +109,8 @@ def map_plan(
         if found is not None:
             notes += found.notes
             folder.write_text("map.csv", csv_text(map_tables.point_columns(found), map_tables.point_rows(found)))
-            folder.write("map.nc", lambda target: found.to_dataset().to_netcdf(target, engine="h5netcdf"))
+            table = found.to_dataset()
+            folder.write("map.nc", lambda target: table.to_netcdf(target, engine="h5netcdf"))
             figure = map_plot.draw_map(found, read.area, **marks)
             folder.write("map.png", lambda target: figure.savefig(target, dpi=150))
         with status("over the prior") as say:

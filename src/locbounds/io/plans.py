@@ -230,6 +230,7 @@ def _region(shape: Shape, path: str) -> PositionPrior:
 def _area(area: AreaSection, dim: int) -> tuple[PositionPrior, float | None, PositionPrior | None]:
     """Region of the plane, height of the map, and the prior that is uniform over it."""
     region, height = _region(area, "area"), area.height_m
+    number: Any = height
     span = height if isinstance(height, list) else None
     if height is not None:
         numbers = span or [height]
@@ -248,6 +249,7 @@ def _area(area: AreaSection, dim: int) -> tuple[PositionPrior, float | None, Pos
     if region.dim == 3:
         if height is not None:
             raise InputError("area has height_m and corners of three coordinates", "Keep one of them")
+        assert isinstance(region, UniformBox)  # no other region has heights
         span = [float(region.low[2]), float(region.high[2])]
         region = UniformBox(region.low[:2], region.high[:2])
     if span is not None:
@@ -256,7 +258,7 @@ def _area(area: AreaSection, dim: int) -> tuple[PositionPrior, float | None, Pos
         raise InputError(
             "the anchors have heights, the area has none", "area.height_m: the height of the map, or [lowest, highest]"
         )
-    return region, float(height), None
+    return region, float(number), None
 
 
 def _prior(table: PriorTable, dim: int) -> PositionPrior:
@@ -313,7 +315,7 @@ def _links(file: PlanFile, positions: dict[str, tuple[float, ...]]) -> list[_Lin
             if k in mine and table.measure != measure:
                 raise InputError(f'anchors.{name} has {k}, but measures "{table.measure}"', f"Remove {k}")
         with at(f"anchors.{name}"):
-            los, nlos = build_noises(table.los, table.nlos or NlosTable(std_m=1.0), table.outlier)
+            los, nlos = build_noises(table.los, table.nlos or NlosTable.model_validate({"std_m": 1.0}), table.outlier)
             noise = soft(los, nlos if table.nlos is not None else None, table.nlos_probability())
         out.append(_Link(name, position, table, noise))
     return out

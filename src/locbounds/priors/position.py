@@ -1,7 +1,7 @@
 """What is known of a static position before the measurement."""
 
 from abc import abstractmethod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import numpy as np
@@ -16,8 +16,12 @@ class PositionPrior(eqx.Module):
     Everything is NumPy and takes points [points, space] in metres.
     """
 
-    mean: eqx.AbstractVar[Float[Array, " space"]]
-    covariance: eqx.AbstractVar[Float[Array, "space space"]]
+    if TYPE_CHECKING:  # where these are properties, type checkers must not take them for arguments of the constructor
+        mean: Float[Array, " space"] = eqx.field(init=False)
+        covariance: Float[Array, "space space"] = eqx.field(init=False)
+    else:
+        mean: eqx.AbstractVar[Float[Array, " space"]]
+        covariance: eqx.AbstractVar[Float[Array, "space space"]]
 
     @property
     def dim(self) -> int:

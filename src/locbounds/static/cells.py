@@ -224,6 +224,7 @@ def per_cell(
     parts = cells_of(area, cells, height)
     out = []
     for k, (corners, law) in enumerate(parts):
+        found: Numbers
         try:
             found = over_prior(plan.replace(prior=law), ids, rtol=rtol, seed=seed)
         except LocboundsError as error:

@@ -298,17 +298,17 @@ def _cancelling(plan: Plan) -> np.ndarray:
 
 def _shared_part(plan: Plan) -> tuple[Any, Any, float] | None:
     """Own deviations [channels], who has the common part [channels], its deviation; None if there is no such form."""
-    groups = [g for g in plan.groups if g.covariance is not None]
-    correlated = [g for g in groups if np.count_nonzero(g.covariance - np.diag(np.diagonal(g.covariance)))]
+    known = [(g, np.asarray(g.covariance)) for g in plan.groups if g.covariance is not None]
+    correlated = [(g, C) for g, C in known if np.count_nonzero(C - np.diag(np.diagonal(C)))]
     if plan.clock_std_m is not None or len(correlated) != 1:
         return None
-    C = np.asarray(correlated[0].covariance)
+    group, C = correlated[0]
     common = float(C[0, 1])
     own = np.diagonal(C) - common
     if not common > 0 or np.any(own <= 1e-3 * common) or not np.allclose(C, np.diag(own) + common, rtol=1e-12, atol=0):
         return None
     variances = 1 / np.diagonal(plan.accuracy_with_clock)
-    here = np.concatenate([np.full(g.size, g is correlated[0]) for g in plan.groups])
+    here = np.concatenate([np.full(g.size, g is group) for g in plan.groups])
     variances[here] = own
     return np.sqrt(variances), here.astype(float), np.sqrt(common)
 

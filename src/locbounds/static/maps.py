@@ -151,7 +151,7 @@ class AccuracyMap:
         flags = {"flag_values": [OUTSIDE, *REASONS], "flag_meanings": "outside bounded singular no_derivative"}
         data["status"] = (("y_m", "x_m"), status, flags)
         p = self.bounds.provenance
-        attrs = {
+        attrs: dict[str, Any] = {
             "title": self.plan.title,
             "method": "crlb",
             "verdict": str(self.bounds.verdict),
