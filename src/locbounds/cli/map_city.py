@@ -5,6 +5,8 @@ from typing import Any
 
 import typer
 
+KINDS = {"toa": "ToA", "tdoa": "TDoA"}
+
 
 def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force: bool = False) -> None:
     """Write the map of a city file into a folder, and print what it says.
@@ -31,6 +33,7 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
     kinds, names = tuple(dict.fromkeys(keys.measure.kinds)), tuple(file.anchors)
     with output_folder(out, force=force) as folder, status("tracing paths") as say:
         x, y, points = city_plot.raster(city, where, keys.city.step_m)
+        streets = city.streets(_box(where), margin_m=keys.city.margin_m, courtyards=keys.city.courtyards)
         found = about.street_map(
             city,
             file.anchors,
@@ -39,9 +42,9 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
             count=keys.measure.nearest,
             roof=file.roof,
             measures=kinds,
+            streets=streets,
         )
         links = found.links
-        streets = city.streets(_box(where), margin_m=keys.city.margin_m, courtyards=keys.city.courtyards)
         if keys.city.courtyards:
             links.refuse_unreached()
         cells = []
@@ -74,8 +77,8 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
             some = value[np.isfinite(value)]
             pictures[kind] = city_plot.draw_map(
                 city, x, y, value, high=float(np.quantile(some, 0.8)) if some.size else None, **marks,
-                label="Cramér-Rao bound: position RMSE in m",
-                title=f"{title}, {kind.upper()}; empty: no bound (sight boundary, or no information)",
+                label="Cramér-Rao bound: position RMSE in m; empty: no bound",
+                title=f"{title}, {KINDS[kind]}",
             )  # fmt: skip
         for name, figure in pictures.items():
             folder.write(f"{name}.png", lambda target, figure=figure: figure.savefig(target, dpi=150))

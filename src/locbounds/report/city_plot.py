@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BUILDING, WALL = "#C9C4BB", "#8A847A"
+MOST_TICKS = 12  # of whole numbers at a colour bar
 FREE, BLOCKED, STREET = "#0072B2", "#D55E00", "#E9F1E6"
 
 
@@ -191,7 +192,9 @@ def draw_map(
     if anchors is not None:
         draw_anchors(panel, np.asarray(anchors), names or [str(k + 1) for k in range(len(anchors))])
     over = bool(some.size and some.max() > (high or 1.0))
-    figure.colorbar(image, ax=panel, label=label, extend="max" if over else "neither", shrink=0.9)
+    whole = bool(some.size) and not np.any(some % 1)
+    ticks = np.arange(int(high) + 1) if whole and high <= MOST_TICKS else None
+    figure.colorbar(image, ax=panel, label=label, extend="max" if over else "neither", shrink=0.9, ticks=ticks)
     if title:
         panel.set_title(title, loc="left", fontsize=10)
     return figure

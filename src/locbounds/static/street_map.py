@@ -132,6 +132,7 @@ def street_map(
     roof: Any = (),
     measures: tuple[str, ...] = MEASURES,
     within_m: float = BOUNDARY_M,
+    streets: Any = None,
 ) -> StreetMap:
     """Cramér-Rao bounds over points of a city, from the nearest anchors.
 
@@ -147,11 +148,14 @@ def street_map(
         ``"toa"``, ``"tdoa"``.
     within_m
         Distance from a sight boundary up to which no bound is given.
+    streets
+        The region that is meant, a Shapely polygon or several; by default all that is free of buildings.
 
     Raises
     ------
     InputError
-        If there are too few anchors, a number is out of range, or no point lies on a street.
+        If there are too few anchors, a number is out of range, no point lies on a street, or an anchor reaches none of
+        those that do.
 
     Examples
     --------
@@ -167,9 +171,14 @@ def street_map(
     if wrong or not measures:
         raise InputError(f"the measures are {', '.join(measures) or 'none'}", f"Choose from {', '.join(MEASURES)}")
     links = street_links(city, anchors, points, roof=roof)
-    if links.inside.all():
+    free = ~links.inside
+    if streets is not None:
+        import shapely
+
+        free &= shapely.contains_xy(streets, *links.points.T)
+    if not free.any():
         raise InputError("no point of the map lies on a street", "Choose another area or a smaller step")
-    deaf = (links.sight[~links.inside] == UNREACHED).all(axis=0)
+    deaf = (links.sight[free] == UNREACHED).all(axis=0)
     if deaf.any():
         raise InputError(
             f"anchor {links.names[int(np.argmax(deaf))]} reaches no street point of the map",
