@@ -13,7 +13,18 @@ from .bounds import (
 )
 from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
-from .filters import EkfBanks, Estimates, FactorisedImmEkf, ImmEkf, ImmKf, ImmKfSmoother, OracleEkf, Rbpf
+from .filters import (
+    EkfBanks,
+    Estimates,
+    FactorisedImmEkf,
+    ImmEkf,
+    ImmKf,
+    ImmKfSmoother,
+    OracleEkf,
+    Predicted,
+    Rbpf,
+    Smoothed,
+)
 from .fit.scenario import fit_scenario
 from .io.logs import read_log
 from .io.scenario_file import load, save
@@ -95,6 +106,7 @@ __all__ = [
     "Mixture",
     "OracleEkf",
     "PrecisionError",
+    "Predicted",
     "Prior",
     "RandomWalk",
     "Range",
@@ -104,6 +116,7 @@ __all__ = [
     "Scenario",
     "Score",
     "Singularity",
+    "Smoothed",
     "StudentT",
     "SwitchingMotion",
     "Times",
