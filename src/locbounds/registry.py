@@ -51,7 +51,7 @@ class Method(NamedTuple):
     conditions
         Under which condition it is valid at all.
     subject
-        What it speaks of: a ``"scenario"`` or a ``"survey"``.
+        What it speaks of: a ``"scenario"``, a ``"survey"`` or a ``"model"`` built in Python.
     """
 
     id: str
@@ -151,6 +151,19 @@ METHODS: dict[str, Method] = {
                 "Gaussian noise, the same everywhere, around the mean fingerprints of the survey",
             ),
             "survey",
+        ),
+        Method(
+            "wwb-recursive",
+            "Recursive WWB",
+            "bound",
+            "Weiss-Weinstein bound of a state that moves, for noises without a Fisher information too.",
+            RANGES,
+            "locbounds.bounds.weinstein:wwb_recursive",
+            ("linear Gaussian motion", "linear measurements", "any noise"),
+            "Loose where neighbouring states hang together closely and only one is moved at a time (its form for one "
+            "distance moves whole paths); a chain that remembers is taken as told.",
+            ("weiss1985", "rapoport2004"),
+            subject="model",
         ),
         Method(
             "imm-ekf",
