@@ -55,6 +55,8 @@ def test_the_table_of_bounds_is_complete():
     assert {m.id for m in bounds_of("scenario")} == set(BOUNDS)
     assert found(METHODS["survey"].function) is lb.survey_bound
     assert [m.id for m in bounds_of("survey")] == ["survey"]
+    assert found(METHODS["wwb-recursive"].function) is lb.wwb_recursive
+    assert [m.id for m in bounds_of("model")] == ["wwb-recursive"]
     for id, bound in BOUNDS.items():
         assert found(METHODS[id].function) is bound
 

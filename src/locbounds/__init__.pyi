@@ -1,5 +1,5 @@
 # The public names: what type checkers see, and what is imported on first use (lazy-loader reads this file).
-from . import papers, testing
+from . import papers, ranging, testing
 from .bounds import (
     AlongTrack,
     Gaussians,
@@ -10,6 +10,7 @@ from .bounds import (
     enumer,
     known_sight,
     los_only,
+    wwb_recursive,
 )
 from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
@@ -140,6 +141,7 @@ __all__ = [
     "papers",
     "plot",
     "quantile",
+    "ranging",
     "read_log",
     "read_survey",
     "reference",
@@ -150,4 +152,5 @@ __all__ = [
     "survey_model",
     "testing",
     "tightest",
+    "wwb_recursive",
 ]

@@ -6,7 +6,7 @@ Docs tables, ``locbounds explain``, verdicts and the command line's choices are 
 import importlib
 from typing import Any, NamedTuple
 
-from locbounds.assumptions import COMMON
+from locbounds.assumptions import COMMON, LINEAR_CHANNELS, LINEAR_MOTION
 from locbounds.errors import InputError
 from locbounds.scenario import Scenario
 from locbounds.verdict import (
@@ -159,10 +159,11 @@ METHODS: dict[str, Method] = {
             "Weiss-Weinstein bound of a state that moves, for noises without a Fisher information too.",
             RANGES,
             "locbounds.bounds.weinstein:wwb_recursive",
-            ("linear Gaussian motion", "linear measurements", "any noise"),
-            "Loose where neighbouring states hang together closely and only one is moved at a time (its form for one "
-            "distance moves whole paths); a chain that remembers is taken as told.",
+            ("any noise",),
+            "Loose for noises with hard edges, by some per cent to a third in the root; where modes remember, it is that of "
+            "estimators that are told them.",
             ("weiss1985", "rapoport2004"),
+            (LINEAR_MOTION, LINEAR_CHANNELS),
             subject="model",
         ),
         Method(

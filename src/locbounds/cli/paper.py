@@ -28,8 +28,8 @@ def paper(
         typer.Option(
             "--samples",
             min=1,
-            help="Draws of every bound, in blocks of 2048; by default until the s.e. is below 0.1 %. For prieto2011 those "
-            "of the information as printed, by default 10,000.",
+            help="Draws of every bound, in blocks of 2048; by default until the s.e. is below 0.1 %. For prieto2011 "
+            "those of the information as printed, by default 10,000.",
         ),
     ] = None,
     runs: Annotated[
@@ -37,8 +37,8 @@ def paper(
         typer.Option(
             "--runs",
             min=2,
-            help="Tracks for every filter; by default 10,000 (the paper: 20,000), for chen2010 400 (the paper: 50), for "
-            "prieto2011 150.",
+            help="Tracks for every filter; by default 10,000 (the paper: 20,000), for chen2010 400 (the paper: 50), "
+            "for prieto2011 160.",
         ),
     ] = None,
     requirement: RequirementOption = "e911",

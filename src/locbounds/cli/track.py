@@ -114,7 +114,9 @@ def applicable_bounds(model: "Scenario", ids: str | None) -> "list[Method]":
         chosen = [] if ids == "none" else [method(id.strip(), "bound") for id in ids.split(",")]
         for m in chosen:
             if m.subject != "scenario":
-                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", f"Run locbounds {m.subject}")
+                python = "Call it from Python on a JumpMarkov model"
+                remedy = python if m.subject == "model" else f"Run locbounds {m.subject}"
+                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", remedy)
         return chosen
     applicable = [m for m in bounds_of("scenario") if m.verdict(model).status is not Status.REFUSED]
     known = any(m.id == "known-sight" for m in applicable)  # then nothing is left to average over

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from locbounds.axes import Array, Float, ndarray
+from locbounds.errors import RefusedError
 from locbounds.noise.base import Noise
 from locbounds.noise.shifted_copies import _W, _X, _panels
 from locbounds.precision import double_precision
@@ -92,6 +93,11 @@ class LogCoefficient:
     noise
         Any noise with a finite variance.
 
+    Raises
+    ------
+    RefusedError
+        If its law has parts so far apart that the coefficient vanishes and comes back with growing shifts.
+
     Examples
     --------
     >>> import locbounds as lb
@@ -105,10 +111,18 @@ class LogCoefficient:
         ends = [end for piece in noise.support() for end in piece]
         self.width = max(ends) - min(ends)  # beyond it the copies do not meet
         top = min(self.width, MOST * unit)
+        means = np.asarray(noise.components()[1])
+        between = np.abs(np.subtract.outer(means, means)).ravel()  # where copies of different parts meet
         far = unit * GROWTH ** np.arange(int(np.log(MOST) / np.log(GROWTH)))
+        far = np.unique(np.append(far, between[between > unit]))
         logs = log_bhattacharyya(noise, far[far < top])
         enough = np.flatnonzero(~(logs > LEAST))
-        if enough.size:
+        if enough.size or len(noise.support()) > 1:
+            if len(noise.support()) > 1 or np.any(logs[enough[0] :] > LEAST):
+                raise RefusedError(
+                    "a noise and its shifted copy part and meet again: its law has parts that lie far apart",
+                    "Make the parts modes of their own, or use bcrb",
+                )
             top = min(top, float(far[enough[0]]))
         self.low, self.high = SMALLEST * unit, top * (1 - 1e-9)
         # dense towards the end of a bounded support, where the logarithm falls without limit

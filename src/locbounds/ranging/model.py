@@ -40,10 +40,11 @@ class DistanceModel(eqx.Module):
     Examples
     --------
     >>> import numpy as np, locbounds as lb
+    >>> from locbounds.ranging import DistanceModel, TimeOfArrival
     >>> toa = TimeOfArrival(lb.Gaussian(0.0, 3.5), samples=10)
     >>> model = DistanceModel(lb.Times.uniform(step_s=1.0, steps=85), [10, 0, 0], [2, 0.5, 0.75], 1.0, [toa])
-    >>> np.linalg.matrix_rank(model.motion.covariances(model.times.intervals)[0])
-    np.int64(1)
+    >>> int(np.linalg.matrix_rank(model.motion.covariances(model.times.intervals)[0]))
+    1
     """
 
     times: Times

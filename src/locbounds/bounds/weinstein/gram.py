@@ -13,7 +13,7 @@ import numpy as np
 
 from locbounds.axes import Float, ndarray
 
-LARGEST = 300.0  # logarithm of the largest entry
+LEAST = -150.0  # log eta of the longest shift that is of use: no entry overflows
 LOST = 1e-7  # eigenvalues of the normalised Gram matrix below it are rounding and left out, which is valid
 
 
@@ -22,7 +22,7 @@ def gram(
 ) -> Float[ndarray, "*n m m"]:
     """The Gram matrix from ``log eta`` of the differences, the sums and the shifts themselves.
 
-    Entries that overflow are limited: such shifts are too long to say anything.
+    Shifts that are so long that their ``eta`` vanishes are left out: their row is zero and their diagonal is huge.
 
     >>> h = np.array([1.0, 2.0])
     >>> log_eta = lambda u: -(u**2) / 8
@@ -30,22 +30,9 @@ def gram(
     >>> np.allclose(G, 4 * np.sinh(np.outer(h, h) / 4))
     True
     """
+    used = single > LEAST
+    single = np.where(used, single, 0.0)
     pair = single[..., :, None] + single[..., None, :]
-    return 2.0 * (_exp(difference - pair) - _exp(total - pair))
-
-
-def _exp(a: ndarray) -> ndarray:
-    return np.exp(np.minimum(np.where(np.isnan(a), LARGEST, a), LARGEST))
-
-
-def largest_square(h: Float[ndarray, "*n m"], G: Float[ndarray, "*n m m"]) -> Float[ndarray, "*n"]:
-    """``h' G^-1 h``; combinations of test functions that vanish up to rounding are left out, which keeps it valid.
-
-    >>> float(largest_square(np.array([1.0]), np.array([[2.0]])))
-    0.5
-    """
-    scale = np.sqrt(np.einsum("...ii->...i", G))
-    values, vectors = np.linalg.eigh(G / scale[..., :, None] / scale[..., None, :])
-    part = np.einsum("...i,...ij->...j", h / scale, vectors) ** 2
-    kept = values > LOST * values[..., -1:]
-    return np.sum(np.where(kept, part / np.where(kept, values, 1.0), 0.0), -1)
+    both = used[..., :, None] & used[..., None, :]
+    G = 2.0 * (np.exp(np.where(both, difference - pair, 0.0)) - np.exp(np.where(both, total - pair, 0.0)))
+    return G + np.where(used, 0.0, np.exp(-2 * LEAST))[..., None] * np.eye(single.shape[-1])

@@ -3,119 +3,79 @@
 from collections.abc import Sequence
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from locbounds.axes import Float, ndarray
+from locbounds.bounds.weinstein.coefficients import ModelCoefficients
+from locbounds.bounds.weinstein.path import path_bound
 from locbounds.bounds.weinstein.recursion import weiss_weinstein_recursion
 from locbounds.errors import InputError, RefusedError
-from locbounds.horizon import PREDICT, SMOOTH, Horizon
-from locbounds.model import AdditiveChannel, DensityMotion, JumpMarkov
-from locbounds.noise import Mixture
-from locbounds.noise.log_coefficient import log_coefficient
+from locbounds.horizon import FILTER, PREDICT, SMOOTH, Horizon
+from locbounds.model import JumpMarkov, jump_markov
+from locbounds.model.linear import gradients, matrices, singular_motion
 from locbounds.precision import double_precision
-from locbounds.priors import DensityPrior
+from locbounds.registry import method
 from locbounds.result import Provenance, Result
-from locbounds.verdict import Status, Verdict
+from locbounds.scenario import Scenario
+from locbounds.verdict import Status
 
+MOVED = ("both", "states", "paths")
 SIZES = (0.6, 1.2, 2.0)  # of the test shifts along each axis, relative to each other
 SCALES = np.geomspace(0.03, 1.5, 12)  # common scales, in conditional deviations
 FINER = 6
-SINGULAR = 1e-12
-LINEAR = 1e-9  # relative change of a gradient from place to place that counts as rounding
-PLACES = 5
-
-
-class _Coefficients:
-    """Of additive channels with linear h: independent over the steps, or with a chain that the estimator is told.
-
-    Where it is told the chain, the modes are part of the data and ``rho = E[prod_j rho_{r_j}]`` over the chain's law.
-    """
-
-    def __init__(self, model: JumpMarkov, gradients: dict[int, ndarray], told: set[int], law: dict[int, ndarray]):
-        self.model, self.gradients, self.told, self.law = model, gradients, told, law
-        self.tables = {}
-        for c, channel in enumerate(model.channels):
-            noises = channel.noises
-            if channel.chain not in told and len(noises) > 1:
-                noises = (Mixture(law[channel.chain][1], noises),)  # drawn afresh at every step
-            self.tables[c] = [log_coefficient(noise) for noise in noises]
-
-    def _by_mode(self, j: int, chain: int, u: ndarray) -> ndarray:
-        """``log rho`` in every mode of a chain, [modes, *n]."""
-        total: Any = 0.0
-        for c, channel in enumerate(self.model.channels):
-            reported = channel.reports is None or bool(np.asarray(channel.reports)[j - 1])
-            if channel.chain == chain and reported:
-                moved = u @ self.gradients[c][j - 1]
-                total = total + np.stack([table(moved) for table in self.tables[c]])
-        modes = len(self.model.chains[chain].start) if chain in self.told else 1
-        return np.broadcast_to(total, (modes, *u.shape[:-1]))
-
-    def single(self, j: int, u: ndarray) -> ndarray:
-        if j == 0:
-            return np.zeros(u.shape[:-1])
-        total = np.zeros(u.shape[:-1])
-        for chain in {channel.chain for channel in self.model.channels}:
-            each = self._by_mode(j, chain, u)
-            total = total + (_log_mean(self.law[chain][j], each) if chain in self.told else each[0])
-        return total
-
-    def excess(self, j: int, g: ndarray, h: ndarray) -> ndarray:
-        total = np.zeros((len(h), len(g)))
-        if j < 2:
-            return total
-        for chain in self.told:
-            before, now = np.exp(self._by_mode(j - 1, chain, g)), np.exp(self._by_mode(j, chain, h))
-            T, law = np.asarray(self.model.transitions(chain))[j - 1], self.law[chain]
-            both = np.einsum("r,rm,rs,sl->lm", law[j - 1], before, T, now)
-            total += np.log(both / np.einsum("l,m->lm", law[j] @ now, law[j - 1] @ before))
-        return total
-
-
-def _log_mean(law: ndarray, logs: ndarray) -> ndarray:
-    top = logs.max(0)
-    top = np.where(np.isfinite(top), top, 0.0)
-    with np.errstate(divide="ignore"):
-        return top + np.log(np.einsum("r,r...->...", law, np.exp(logs - top)))
+LONGEST = 60.0  # conditional deviations: where the search for a common scale ends
+# of the information, in units of one over the smallest variance: they choose directions only
+GUESSES = (0.2, 1.0, 10.0)
 
 
 @double_precision
 def wwb_recursive(
-    model: JumpMarkov, *, sizes: Sequence[float] = SIZES, horizon: str | Horizon = "filter", scale: float | None = None
+    model: JumpMarkov | Scenario,
+    *,
+    horizon: str | Horizon = "filter",
+    moved: str = "both",
+    sizes: Sequence[float] | ndarray = SIZES,
+    scale: float | None = None,
 ) -> Result:
     """Recursive Weiss-Weinstein bound, for noises without a Fisher information too; nothing is drawn.
 
     Parameters
     ----------
     model
-        Linear Gaussian motion without modes and with a regular Q, Gaussian prior, additive channels whose ``h`` is
-        linear in the state. Where a chain's modes are drawn afresh at every step, its noise is their mixture. Where
-        the chain remembers, the bound is that of estimators which are told its modes, and says so: the coefficients
-        of the unknown chain are integrals over all measurements at once.
-    sizes
-        Lengths of the test shifts along each axis of the state, relative to each other: several points per axis.
+        Linear Gaussian motion without modes, Gaussian prior, additive channels whose ``h`` is linear in the state.
+        Where a chain's modes are drawn afresh at every step, its noise is their mixture. Where the chain remembers, the
+        bound is that of estimators which are told its modes, and says so: the coefficients of a chain that nobody is
+        told are integrals over all measurements at once.
     horizon
-        ``"filter"``, or ``"predict:N"``.
+        ``"filter"``, ``"predict:N"`` or ``"smooth"``; the last one by moved paths only.
+    moved
+        What test functions move: ``"states"``, one state at a time, by recursion (the motion has to be regular);
+        ``"paths"``, whole paths in the best direction, at a cost quadratic in steps; ``"both"``: the larger bound of
+        every step.
+    sizes
+        Lengths of the test shifts of the recursion along each axis of the state, relative to each other.
     scale
-        Common scale of all shifts in conditional deviations; by default the best one is searched for every step.
+        Common scale of the recursion's shifts in conditional deviations; by default the best one is searched for
+        every step.
 
     Returns
     -------
     Result
-        ``diagnostics["scale"]`` [steps+1]: the best scale. At the lowest one of the search the shifts tend to zero, as
-        they do for smooth noises: the bound is then the Bayesian Cramér-Rao bound.
+        ``diagnostics["scale"]`` [steps+1]: the best scale of the recursion, NaN where a path was better. At the lowest
+        one of the search the shifts tend to zero, as they do for smooth noises: the bound is then the Bayesian
+        Cramér-Rao bound.
 
     Raises
     ------
     RefusedError
-        If the model is another one, or no path is free to be moved at one step alone (singular Q).
+        If the model is another one; if states are moved alone where the motion leaves some direction without noise.
+    InputError
+        If an option makes no sense.
 
     Notes
     -----
-    :mod:`locbounds.bounds.weinstein.recursion`; every choice of shifts is valid, and the one with the largest position
-    error counts.
+    :mod:`locbounds.bounds.weinstein.recursion` and :mod:`locbounds.bounds.weinstein.path`; every choice of shifts is
+    valid, and the one with the largest position error counts.
 
     Examples
     --------
@@ -131,53 +91,94 @@ def wwb_recursive(
     ...     chains=lb.MarkovSight([1.0], [[1.0]]),
     ... )
     >>> wwb_recursive(model).position_rmse.values.round(2)
-    array([2.  , 0.5 , 0.39, 0.37, 0.37])
+    array([2.  , 0.45, 0.33, 0.32, 0.31])
     """
+    model = jump_markov(model) if isinstance(model, Scenario) else model
     horizon = Horizon.parse(horizon, model.steps)
-    if horizon.kind == SMOOTH:
-        raise RefusedError("the recursive Weiss-Weinstein bound has no smoothing form here", "Use filter or predict:N")
-    F, Q, P0 = _linear_gaussian(model)
-    gradients = {c: _gradient(model, c) for c in range(len(model.channels))}
-    law = {c: _law(model, c) for c in range(len(model.chains))}
-    remembers = {c for c in law if _remembers(np.asarray(model.transitions(c)), law[c])}
-    told = {channel.chain for channel in model.channels if channel.chain in remembers}
-    coefficients = _Coefficients(model, gradients, told, law)
-    axes = _axes(model, F, Q, P0, gradients, coefficients)
-    relative = np.asarray(sizes, dtype=float)
-    if relative.ndim != 1 or not len(relative) or not np.all(relative > 0):
-        raise InputError(f"the sizes are {sizes}", "Give positive numbers, for example (0.6, 1.2, 2.0)")
+    _check(moved, sizes, scale)
+    entry = method("wwb-recursive")
+    verdict = entry.verdict(model)
+    why = singular_motion(model) if moved == "states" else None
+    if verdict.status is Status.REFUSED or why is not None:
+        reasons = verdict.reasons if why is None else (why,)
+        raise RefusedError(
+            f"wwb-recursive does not apply: {'; '.join(reasons)}", "See: locbounds explain wwb-recursive"
+        )
+    if moved == "states" and horizon.kind == SMOOTH:
+        raise RefusedError("test functions that move one state at a time give no smoothing bound", "Use moved='paths'")
+    F, Q, P0 = matrices(model)
+    slopes = gradients(model)
+    coefficients = ModelCoefficients(model, slopes)
+    if coefficients.told:
+        verdict = entry.verdict(model, ("estimators told the modes: a bound for all that are not told them too",))
     index = np.array(model.position_index)
-
-    def bound(scale: float) -> ndarray:
-        shifts = (scale * relative[:, None, None] * axes[:, None]).reshape(len(axes), -1, axes.shape[-1])
-        return weiss_weinstein_recursion(F, Q, P0, shifts, coefficients)
-
-    tried = SCALES if scale is None else np.array([float(scale)])
-    found = np.stack([bound(s) for s in tried])
-    if scale is None:
-        at = int(np.argmax(found[:, -1, index, index].sum(-1)))
-        near = np.geomspace(tried[max(at - 1, 0)], tried[min(at + 1, len(tried) - 1)], FINER)
-        tried, found = np.append(tried, near), np.concatenate([found, np.stack([bound(s) for s in near])])
-    best = found[:, :, index, index].sum(-1).argmax(0)
-    P = found[best, np.arange(model.steps + 1)]
-    if horizon.kind == PREDICT:
-        P = _ahead(P, F, Q, P0, horizon.ahead)
+    times = model.steps + 1
+    P, best = np.zeros((times, len(P0), len(P0))), np.full(times, np.nan)
+    if moved != "paths" and horizon.kind != SMOOTH and singular_motion(model) is None:
+        axes = _axes(model, F, Q, P0, slopes)
+        P, best = _states(F, Q, P0, axes, coefficients, index, np.asarray(sizes, dtype=float), scale)
+        if horizon.kind == PREDICT:
+            P = _ahead(P, F, Q, P0, horizon.ahead)
+    if moved != "states":
+        other = _paths(F, Q, P0, slopes, coefficients, index, horizon)
+        larger = other[:, index, index].sum(-1) > P[:, index, index].sum(-1)
+        P, best = np.where(larger[:, None, None], other, P), np.where(larger, np.nan, best)
     mse = P[:, index, index].sum(-1)
-    sees = frozenset({"ranges", "sight"} if told else {"ranges"})
-    grounds = ("linear Gaussian motion", "linear measurements", "any noise")
     return Result(
-        id="wwb-recursive",
-        name="Recursive WWB" + horizon.label,
+        id=entry.id,
+        name=entry.name + horizon.label,
         kind="bound",
-        sees=horizon.sees(sees),
+        sees=horizon.sees(entry.sees | frozenset({"sight"}) if coefficients.told else entry.sees),
         time_s=np.asarray(model.times.time_s),
         position_mse=mse,
         replicates=np.zeros((1, len(mse))),
         covariance=P,
-        verdict=Verdict(Status.VALID, grounds + (("estimators told the modes",) if told else ())),
-        provenance=Provenance.now(0, 0, "interior and end blocks, shifts of one state each", ("rapoport2004",)),
-        diagnostics={"scale": tried[best]},
+        verdict=verdict,
+        provenance=Provenance.now(0, 0, f"test functions move {moved}", entry.references),
+        diagnostics={"scale": best},
     )
+
+
+def _check(moved: str, sizes: Sequence[float] | ndarray, scale: float | None) -> None:
+    if moved not in MOVED:
+        raise InputError(f"moved is {moved!r}", f"Give one of {', '.join(MOVED)}")
+    relative = np.asarray(sizes, dtype=float)
+    if relative.ndim != 1 or not len(relative) or not np.all(np.isfinite(relative) & (relative > 0)):
+        raise InputError(f"the sizes are {sizes}", "Give positive numbers, for example (0.6, 1.2, 2.0)")
+    if scale is not None and not (np.isfinite(scale) and scale > 0):
+        raise InputError(f"the scale is {scale}", "Give a positive number, or none: then the best is searched")
+
+
+def _states(
+    F: ndarray, Q: ndarray, P0: ndarray, axes: ndarray, coefficients: ModelCoefficients, index: ndarray,
+    sizes: ndarray, scale: float | None,
+) -> tuple[Float[ndarray, "times state state"], Float[ndarray, " times"]]:  # fmt: skip
+    """Bounds by shifts of one state each, and the best common scales of these."""
+
+    def bounds(scales: ndarray) -> tuple[ndarray, ndarray]:
+        found = []
+        for one in scales:
+            shifts = (one * sizes[:, None, None] * axes[:, None]).reshape(len(axes), -1, axes.shape[-1])
+            found.append(weiss_weinstein_recursion(F, Q, P0, shifts, coefficients))
+        found = np.stack(found)
+        return found, found[:, :, index, index].sum(-1)
+
+    if scale is not None:
+        return bounds(np.array([float(scale)]))[0][0], np.full(len(axes), float(scale))
+    tried = SCALES
+    found, position = bounds(tried)
+    while np.any(position.argmax(0) == len(tried) - 1) and tried[-1] < LONGEST:  # the grid is too short
+        tried = np.append(tried, tried[-1] * np.array([1.5, 2.25]))
+        more, at = bounds(tried[-2:])
+        found, position = np.concatenate([found, more]), np.concatenate([position, at])
+    grid = tried
+    for i in np.unique(position.argmax(0)):
+        near = np.geomspace(grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)], FINER)[1:-1]
+        more, at = bounds(near)
+        tried = np.append(tried, near)
+        found, position = np.concatenate([found, more]), np.concatenate([position, at])
+    best = position.argmax(0)
+    return found[best, np.arange(len(axes))], tried[best]
 
 
 def _ahead(P: ndarray, F: ndarray, Q: ndarray, P0: ndarray, ahead: int) -> ndarray:
@@ -190,78 +191,53 @@ def _ahead(P: ndarray, F: ndarray, Q: ndarray, P0: ndarray, ahead: int) -> ndarr
     return np.stack(out)
 
 
-def _linear_gaussian(model: JumpMarkov) -> tuple[ndarray, ndarray, ndarray]:
-    if isinstance(model.motion, tuple | DensityMotion) or isinstance(model.prior, DensityPrior):
-        raise RefusedError("the motion or the prior is not linear Gaussian without modes", "Use bcrb")
-    intervals = model.times.intervals
-    F, Q = np.asarray(model.motion.transitions(intervals)), np.asarray(model.motion.covariances(intervals))
-    P0 = np.asarray(model.prior.covariance)
-    for k, S in enumerate([P0, *Q]):
-        values = np.linalg.eigvalsh(S / np.sqrt(np.outer(d := np.maximum(np.diag(S), 1e-300), d)))
-        if not values[0] > SINGULAR:
-            what = "the prior" if k == 0 else f"Q of step {k}"
-            raise RefusedError(
-                f"{what} is singular: no state can be moved alone without breaking the motion",
-                "Give noise in every direction, or use locbounds.ranging, which moves whole paths",
-            )
-    return F, Q, P0
-
-
-def _gradient(model: JumpMarkov, c: int) -> Float[ndarray, "steps state"]:
-    """Gradient of a channel's h at every step; a RefusedError where it is not the same at all places and modes."""
-    channel = model.channels[c]
-    if not isinstance(channel, AdditiveChannel):
-        raise RefusedError(f"channel {c} is no h(x) plus noise", "Use AdditiveChannel")
-    view = np.arange(model.state_size) if channel.view is None else np.array(channel.view)
-    rng = np.random.default_rng(0)
-    spread = np.sqrt(np.diag(np.asarray(model.prior.covariance)))
-    places = np.asarray(model.prior.mean) + spread * rng.normal(size=(PLACES, model.state_size))
-    k = jnp.arange(1, model.steps + 1)
-    values, slopes = [], []
-    for r in range(len(channel.noises)):
-
-        def h(x, k, r=r):
-            return jnp.reshape(channel.h(x, r, k), ())
-
-        both = jax.vmap(jax.vmap(jax.value_and_grad(h), (None, 0)), (0, None))(jnp.asarray(places[:, view]), k)
-        values.append(np.asarray(both[0]))
-        slopes.append(np.asarray(both[1]))
-    values, slopes = np.stack(values), np.stack(slopes)  # [modes, places, steps, ...]
-    scale = max(np.abs(slopes).max(), 1e-300)
-    if np.abs(slopes - slopes[:1, :1]).max() > LINEAR * scale or np.abs(values - values[:1]).max() > LINEAR * (
-        1 + np.abs(values).max()
-    ):
-        raise RefusedError(
-            f"h of channel {c} is not linear in the state, or depends on the mode",
-            "Put a mode's offset into its noise; for other h use bcrb",
-        )
-    full = np.zeros((model.steps, model.state_size))
-    full[:, view] = slopes[0, 0]
-    return full
-
-
-def _law(model: JumpMarkov, c: int) -> ndarray:
-    """Law of a chain's mode at steps 0..K."""
-    law = [np.asarray(model.chains[c].start)]
-    for T in np.asarray(model.transitions(c)):
-        law.append(law[-1] @ T)
-    return np.stack(law)
-
-
-def _remembers(T: ndarray, law: ndarray) -> bool:
-    return law.shape[1] > 1 and not (np.allclose(T, T[:, :1], atol=1e-12) and np.allclose(law[1:], law[1], atol=1e-12))
-
-
-def _axes(model, F, Q, P0, gradients, coefficients) -> Float[ndarray, "times state state"]:
+def _axes(model: JumpMarkov, F: ndarray, Q: ndarray, P0: ndarray, slopes: ndarray) -> Float[ndarray, "times n n"]:
     """Test directions of every state: columns of a root of its covariance given all others, roughly."""
     inverse = [np.linalg.inv(P0), *np.linalg.inv(Q)]
+    least = _least_variances(model)
     out = []
     for k in range(model.steps + 1):
         J = inverse[k] + (F[k].T @ inverse[k + 1] @ F[k] if k < model.steps else 0.0)
         if k:
-            for c, channel in enumerate(model.channels):
-                reported = channel.reports is None or bool(np.asarray(channel.reports)[k - 1])
-                g = gradients[c][k - 1]
-                J = J + reported * np.outer(g, g) / min(float(n.variance) for n in channel.noises)
+            J = J + np.einsum("ca,c,cb->ab", slopes[:, k - 1], 1 / least, slopes[:, k - 1])
         out.append(np.linalg.cholesky(np.linalg.inv(J)).T)
     return np.stack(out)
+
+
+def _least_variances(model: JumpMarkov) -> Float[ndarray, " channels"]:
+    channels: Any = model.channels
+    return np.array([min(float(n.variance) for n in channel.noises) for channel in channels])
+
+
+def _paths(
+    F: ndarray, Q: ndarray, P0: ndarray, slopes: ndarray, coefficients: ModelCoefficients, index: ndarray,
+    horizon: Horizon,
+) -> Float[ndarray, "times state state"]:  # fmt: skip
+    """Bounds by shifts of whole paths."""
+    steps, n = len(F), len(P0)
+    X = np.zeros((steps + 1, n, n * (steps + 1)))  # x_k = X_k theta
+    X[0, :, :n] = _root(P0)
+    for k in range(1, steps + 1):
+        X[k] = F[k - 1] @ X[k - 1]
+        X[k, :, n * k : n * (k + 1)] = _root(Q[k - 1])
+    D = np.einsum("cka,kat->kct", slopes, X[1:])
+    rough = 1 / _least_variances(coefficients.model)
+    order = np.concatenate([index, np.setdiff1d(np.arange(n), index)])
+    out = []
+    for k in range(steps + 1):
+        last = {FILTER: k, PREDICT: max(k - horizon.ahead, 0), SMOOTH: steps}[horizon.kind]
+        if last == 0:
+            out.append(X[k] @ X[k].T)
+            continue
+        rows = D[:last].reshape(last * len(rough), -1)
+        size = n * (max(last, k) + 1)  # later noises change nothing
+        guesses = np.outer(GUESSES, np.tile(rough, last))
+        bound, _ = path_bound(rows[:, :size], coefficients.path, guesses, X[k][order, :size], len(index))
+        back = np.argsort(order)
+        out.append(bound[np.ix_(back, back)])
+    return np.stack(out)
+
+
+def _root(S: ndarray) -> ndarray:
+    values, vectors = np.linalg.eigh(S)
+    return vectors * np.sqrt(np.maximum(values, 0.0))

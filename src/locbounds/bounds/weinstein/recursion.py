@@ -20,14 +20,15 @@ only the interior blocks are carried forward; the end block gives the filtering 
 (Rapoport, Oshman 2004).
 """
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from locbounds.axes import Float, ndarray
-from locbounds.bounds.weinstein.gram import LARGEST, LOST, gram
+from locbounds.bounds.weinstein.gram import LEAST, LOST, gram
 
 
+@runtime_checkable
 class Coefficients(Protocol):
     """Bhattacharyya coefficients of the measurements, for shifts of the states."""
 
@@ -59,29 +60,36 @@ def weiss_weinstein_recursion(
         What the measurements say.
     """
     information = [np.linalg.inv(P0), *np.linalg.inv(Q)]
-    carried, bounds = None, []
+    carried, used, bounds = None, None, []
     for k, h in enumerate(shifts):
         cross = None
+        log_rho = [coefficients.single(k, u) for u in (h[:, None] - h, h[:, None] + h, h)]
+        end, fine = _block(h, information[k], log_rho)
         if k:
             C = information[k] @ F[k - 1]
-            argument = np.clip(-h @ C @ shifts[k - 1].T / 4, -LARGEST, LARGEST)
-            cross = 4 * np.sinh(argument) * np.exp(coefficients.excess(k, shifts[k - 1], h))
+            both = fine[:, None] & used  # for these the argument is below 300
+            with np.errstate(over="ignore", invalid="ignore"):
+                cross = 4 * np.sinh(-h @ C @ shifts[k - 1].T / 4) * np.exp(coefficients.excess(k, shifts[k - 1], h))
+            cross = np.where(both, cross, 0.0)
             cross = cross @ _inverse(carried) @ cross.T
-        log_rho = [coefficients.single(k, u) for u in (h[:, None] - h, h[:, None] + h, h)]
-        end = _block(h, information[k], log_rho)
         bounds.append(h.T @ _inverse(end if cross is None else end - cross) @ h)
         if k < len(F):
-            interior = _block(h, information[k] + F[k].T @ information[k + 1] @ F[k], log_rho)
-            carried = interior if cross is None else interior - cross
+            interior, used = _block(h, information[k] + F[k].T @ information[k + 1] @ F[k], log_rho)
+            carried = interior if cross is None else interior - np.where(used[:, None] & used, cross, 0.0)
     found = np.stack(bounds)
     return 0.5 * (found + np.swapaxes(found, 1, 2))
 
 
-def _block(h: ndarray, A: ndarray, log_rho: list[ndarray]) -> ndarray:
+def _block(h: ndarray, A: ndarray, log_rho: list[ndarray]) -> tuple[ndarray, ndarray]:
+    """A diagonal block, and which of its shifts are of use."""
+
     def log_eta(u: ndarray, log_rho: ndarray) -> ndarray:
         return -np.einsum("...a,ab,...b->...", u, A, u) / 8 + log_rho
 
-    return gram(*(log_eta(u, r) for u, r in zip((h[:, None] - h, h[:, None] + h, h), log_rho, strict=True)))
+    difference, total, single = (
+        log_eta(u, r) for u, r in zip((h[:, None] - h, h[:, None] + h, h), log_rho, strict=True)
+    )
+    return gram(difference, total, single), single > LEAST
 
 
 def _inverse(G: ndarray) -> ndarray:

@@ -1,8 +1,10 @@
 """Real distances: what fitted noises permit at measured points, and what simple estimators reach there.
 
-One link is one distance, measured by a block of samples of both kinds. An error is ``offset + bias + noise``: the noise
-is drawn for every sample, the bias stays the same for the block. Both are fitted on training points, everything else
-happens on test points that the fit has not seen.
+One link is one distance, measured by a block of samples of both kinds. An error is ``bias + noise``: the noise is drawn
+for every sample, the bias stays the same for the block. Both laws are fitted on training points, everything else
+happens on test points that the fit has not seen. With Gaussian noise the block mean is sufficient (its density is that
+of one sample with law :func:`block_law`), and the prior of the distance is that of the training links: so the posterior
+mean and its mean square error, which no other estimator undercuts if the laws are right, are sums over these.
 """
 
 import csv
@@ -10,17 +12,22 @@ import gzip
 from pathlib import Path
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from locbounds.axes import Float, ndarray
 from locbounds.errors import InputError
 from locbounds.fit.compare_laws import compare_noise_laws
-from locbounds.noise import Gaussian, Noise
+from locbounds.noise import Epoch, Gaussian, Noise
+from locbounds.precision import double_precision
 from locbounds.ranging import Strength, TimeOfArrival
 
 FOLDER = "wifi_rtt_grid"
 FAMILIES = ("gaussian", "laplace", "exponentially-modified-gaussian")
 LEAST_SAMPLES = 10
+DRAWS = 2_000  # of the mean square error that the fitted laws predict
+NEAREST_M = 0.5
 COLUMNS = ("scene", "measured", "method", "rmse_m", "stderr_m", "links", "note")
 
 
@@ -84,84 +91,165 @@ def read(folder: Path) -> dict[str, Links]:
     return {scene: Links(*(np.array(column) for column in zip(*r, strict=True))) for scene, r in rows.items()}
 
 
-def compare(folder: Path) -> list[Row]:
+def compare(folder: Path, *, seed: int = 0) -> list[Row]:
     """Fit on the training points of every scene, compare on its test points.
 
     Parameters
     ----------
     folder
         That of ``wifi_rtt_grid``.
+    seed
+        Of the draws of the predicted mean square error.
 
     Returns
     -------
     list of Row
-        RMSE of the distance in metres. Bounds are Cramér-Rao numbers at the true distances of the test links, rooted
-        means over links: with the fitted bias common to a block (what the data are like) and, optimistically, drawn
-        anew for every sample. Standard errors are over points.
+        RMSE of the distance in metres. Cramér-Rao numbers are at the true distances of the test links, rooted means
+        over links: with the fitted bias common to a block (what the data are like) and, optimistically, drawn anew for
+        every sample. Standard errors of estimators are over points, those of predictions over draws.
     """
-    return [row for scene, links in read(folder).items() for row in _scene(scene, links)]
+    return [row for scene, links in read(folder).items() for row in _scene(scene, links, seed)]
 
 
-def _scene(scene: str, links: Links) -> list[Row]:
-    train, test = links.train, ~links.train
-    d = links.distance_m
-    X = np.stack([np.ones(train.sum()), -10 * np.log10(d[train])], 1)
-    (level, exponent), *_ = np.linalg.lstsq(X, links.rssi[train], rcond=None)
-    errors = {"toa": links.range_m - d, "rss": links.rssi - level + 10 * exponent * np.log10(d)}
-    within = {"toa": links.within_range, "rss": links.within_rssi}
-    M = int(np.median(links.samples))
-    informations: dict[str, dict[bool, float]] = {}
-    notes, offsets, spreads = {}, {}, {}
-    half = links.point % 2 == 0  # of the training points one half fits the law of the bias, the other chooses it
-    for kind, e in errors.items():
-        std = float(np.sqrt(within[kind][train].mean()))
-        rows = compare_noise_laws(
-            e[train & half], e[train & ~half], groups=links.point[train & ~half], families=FAMILIES
+class Fitted(NamedTuple):
+    """One kind of measurement, fitted on the training links: ``mean = curve(d) + bias + noise``."""
+
+    kind: str
+    level: float
+    exponent: float
+    bias: Noise
+    noise_std: float
+    family: str
+    spread: float
+
+    def curve(self, d: ndarray) -> ndarray:
+        """What is measured at a distance, without errors."""
+        return d if self.kind == "toa" else self.level - 10 * self.exponent * np.log10(d)
+
+    def slope(self, d: ndarray) -> ndarray:
+        """Its derivative."""
+        return np.ones_like(d) if self.kind == "toa" else -10 * self.exponent / np.log(10) / d
+
+    def information(self, samples: int, common: bool) -> float:
+        """Of a block about a shift of its samples."""
+        noise, options = Gaussian(0.0, self.noise_std), {"samples": samples, "common": common}
+        sensor = (
+            TimeOfArrival(noise, self.bias, cycles_per_m=1.0, **options)
+            if self.kind == "toa"
+            else Strength(noise, self.bias, exponent=self.exponent, level=self.level, **options)
         )
-        best = next(row for row in rows if row.fit is not None)
-        assert best.fit is not None
-        bias: Noise = compare_noise_laws(e[train], e[train], families=(best.family,))[0].fit.noise  # type: ignore[union-attr]
-        offsets[kind], spreads[kind] = float(np.mean(e[train])), float(np.std(e[train]))
-        informations[kind] = {}
-        for common in (True, False):
-            options = {"samples": M, "common": common}
-            noise = Gaussian(0.0, std)
-            sensor = (
-                TimeOfArrival(noise, bias, cycles_per_m=1.0, **options)
-                if kind == "toa"
-                else Strength(noise, bias, exponent=exponent, level=level, **options)
-            )
-            informations[kind][common] = float(sensor.information())
-        unit = "m" if kind == "toa" else "dB"
-        notes[kind] = f"bias: {best.family}, deviation {spreads[kind]:.2f} {unit}; noise {std:.2f} {unit}"
-        if kind == "rss":
-            notes[kind] += f"; exponent {exponent:.2f}"
-    slope = {"toa": np.ones_like(d), "rss": 10 * exponent / np.log(10) / d}
-    estimates = {
-        "toa": links.range_m - offsets["toa"],
-        "rss": 10 ** ((level - links.rssi) / (10 * exponent)),
-    }
-    seen = np.maximum(estimates["toa"], 0.5)  # where the strength is linearised
-    residual = links.rssi - level + 10 * exponent * np.log10(seen)
-    weight = {"toa": spreads["toa"] ** -2.0, "rss": (10 * exponent / np.log(10) / seen / spreads["rss"]) ** 2}
-    step = -residual / (10 * exponent / np.log(10) / seen)
-    moved = seen + step
-    estimates["fusion"] = (weight["toa"] * estimates["toa"] + weight["rss"] * moved) / (weight["toa"] + weight["rss"])
+        return float(sensor.information())
+
+    def block_law(self, samples: int) -> Noise:
+        """Law of the error of a block's mean."""
+        return Epoch(Gaussian(0.0, self.noise_std), self.bias, samples, common=True).as_noise()
+
+
+def fit(kind: str, links: Links) -> Fitted:
+    """Fit one kind, ``"toa"`` or ``"rss"``, to the training links.
+
+    The family of the bias is the one that says most about the second half of the training points, from a fit to the
+    first half.
+    """
+    train, half = links.train, links.point % 2 == 0
+    d, level, exponent = links.distance_m, 0.0, 1.0
+    if kind == "rss":
+        X = np.stack([np.ones(train.sum()), -10 * np.log10(d[train])], 1)
+        level, exponent = (float(x) for x in np.linalg.lstsq(X, links.rssi[train], rcond=None)[0])
+        e = links.rssi - level + 10 * exponent * np.log10(d)
+    else:
+        e = links.range_m - d
+    within = links.within_range if kind == "toa" else links.within_rssi
+    rows = compare_noise_laws(e[train & half], e[train & ~half], groups=links.point[train & ~half], families=FAMILIES)
+    best = next(row for row in rows if row.fit is not None)
+    bias = compare_noise_laws(e[train], e[train], families=(best.family,))[0].fit
+    assert bias is not None
+    std = float(np.sqrt(within[train].mean()))
+    return Fitted(kind, level, exponent, bias.noise, std, best.family, float(np.std(e[train])))
+
+
+@double_precision
+def _log_density(law: Noise, e: ndarray) -> ndarray:
+    return np.asarray(law.log_prob(jnp.asarray(e)))
+
+
+@double_precision
+def _draw(law: Noise, count: int, seed: int) -> ndarray:
+    return np.asarray(law.sample(jax.random.key(seed), (count,)))
+
+
+def posterior_mean(
+    fitted: tuple[Fitted, ...], values: tuple[ndarray, ...], prior: Float[ndarray, " places"], samples: int
+) -> Float[ndarray, " n"]:
+    """Posterior means of distances from block means, with equal prior weights on some places.
+
+    Parameters
+    ----------
+    fitted
+        The kinds that are used.
+    values
+        Block means of each kind, [n].
+    prior
+        Distances.
+    samples
+        Samples per block.
+    """
+    total = np.zeros((len(values[0]), len(prior)))
+    for f, z in zip(fitted, values, strict=True):
+        total = total + _log_density(f.block_law(samples), z[:, None] - f.curve(prior))
+    weight = np.exp(total - total.max(1, keepdims=True))
+    return weight @ prior / weight.sum(1)
+
+
+def _scene(scene: str, links: Links, seed: int) -> list[Row]:
+    train, test, d = links.train, ~links.train, links.distance_m
+    toa, rss = fit("toa", links), fit("rss", links)
+    M = int(np.median(links.samples))
+    block = {"toa": links.range_m, "rss": links.rssi}
+    rng = np.random.default_rng(seed)
+    prior = np.sort(d[train])
+    drawn = prior[rng.integers(len(prior), size=DRAWS)]
+    simple = _simple(toa, rss, links)
     out = []
-    for measured in ("rss", "toa", "fusion"):
-        kinds = ("toa", "rss") if measured == "fusion" else (measured,)
-        note = "" if measured == "fusion" else notes[measured]
-        for common, name in ((False, "bound, bias drawn for every sample"), (True, "bound, bias common to the block")):
-            J = sum(informations[kind][common] * slope[kind] ** 2 for kind in kinds)
-            out.append(Row(scene, measured, name, float(np.sqrt(np.mean(1 / J[test]))), 0.0, int(test.sum()), note))
-        error = (estimates[measured] - d)[test]
-        value, stderr = _rmse(error, links.point[test])
-        label = {"rss": "inverted path loss", "toa": "mean range less offset", "fusion": "weighted mean"}[measured]
-        out.append(Row(scene, measured, label, value, stderr, int(test.sum()), ""))
-        if measured != "toa":  # few links with huge errors make the RMSE of what is inverted
-            central = float(np.median(np.abs(error)) / 0.6745)
-            out.append(Row(scene, measured, f"{label}, robust spread", central, float("nan"), int(test.sum()), ""))
+    for measured, used in (("rss", (rss,)), ("toa", (toa,)), ("fusion", (toa, rss))):
+        note = "" if measured == "fusion" else _note(used[0])
+        for common, name in ((False, "Cramér-Rao, bias drawn per sample"), (True, "Cramér-Rao, bias of the block")):
+            J = sum(f.information(M, common) * f.slope(d[test]) ** 2 for f in used)
+            out.append(Row(scene, measured, name, float(np.sqrt(np.mean(1 / J))), 0.0, int(test.sum()), note))
+        z = tuple(f.curve(drawn) + _draw(f.block_law(M), DRAWS, seed + i) for i, f in enumerate(used))
+        squares = (posterior_mean(used, z, prior, M) - drawn) ** 2
+        root = float(np.sqrt(squares.mean()))
+        error = float(squares.std() / np.sqrt(DRAWS) / (2 * root))
+        out.append(Row(scene, measured, "posterior mean, as the laws predict", root, error, DRAWS, ""))
+        found = posterior_mean(used, tuple(block[f.kind][test] for f in used), prior, M)
+        names = {"posterior mean, measured": found, **simple[measured]}
+        for name, estimate in names.items():
+            value, stderr = _rmse((estimate if len(estimate) < len(d) else estimate[test]) - d[test], links.point[test])
+            out.append(Row(scene, measured, name, value, stderr, int(test.sum()), ""))
     return out
+
+
+def _note(f: Fitted) -> str:
+    unit = "m" if f.kind == "toa" else "dB"
+    note = f"bias {SHORT.get(f.family, f.family)}, {f.spread:.2f} {unit}; noise {f.noise_std:.2f} {unit}"
+    return note if f.kind == "toa" else f"{note}; exponent {f.exponent:.2f}"
+
+
+SHORT = {"exponentially-modified-gaussian": "Gaussian + exponential"}
+
+
+def _simple(toa: Fitted, rss: Fitted, links: Links) -> dict[str, dict[str, ndarray]]:
+    """Estimates of all links, by kind and name."""
+    mean = links.range_m - float(np.mean((links.range_m - links.distance_m)[links.train]))
+    inverted = 10 ** ((rss.level - links.rssi) / (10 * rss.exponent))
+    near = np.maximum(mean, NEAREST_M)  # where the strength is linearised
+    moved = near + (links.rssi - rss.curve(near)) / rss.slope(near)
+    a, b = toa.spread**-2.0, (rss.slope(near) / rss.spread) ** 2
+    return {
+        "rss": {"inverted path loss": inverted},
+        "toa": {"mean range less offset": mean},
+        "fusion": {"weighted mean": (a * mean + b * moved) / (a + b)},
+    }
 
 
 def _rmse(error: Float[ndarray, " n"], point: ndarray) -> tuple[float, float]:
@@ -173,10 +261,12 @@ def _rmse(error: Float[ndarray, " n"], point: ndarray) -> tuple[float, float]:
 
 
 WHY = (
-    "Samples of one block share their bias: bounds that draw it anew for every sample promise what no estimator can reach.",
-    "With the common bias the time-of-arrival bound and the mean range agree within what the misfit of one law for all "
-    "places explains; averaging more samples does not help.",
-    "Inverting the path loss multiplies the distance by a random factor: its error grows with the distance and is biased "
-    "upwards, which a Cramér-Rao number at the true distance, for unbiased estimators and small errors, leaves out.",
-    "Cramér-Rao numbers at given distances hold for unbiased estimators; they are no bounds for estimators that shrink.",
+    "Samples of one block share their bias. A Cramér-Rao number that draws it anew for every sample promises what no "
+    "estimator reaches, and averaging more samples does not help.",
+    "With the bias of the block, one block is one observation. The Cramér-Rao number is attained for Gaussian laws only: "
+    "where the bias is skewed it asks for many blocks, and the best that one block permits is the deviation of the law.",
+    "The posterior mean is the best estimator if laws and prior (the training distances) are right. What it reaches on "
+    "test points differs from what they predict because one law stands for all places and anchors.",
+    "It beats the Cramér-Rao number where strengths say little: that holds for unbiased estimators at a given distance, "
+    "and the prior shrinks. Inverting the path loss multiplies the distance by a random factor, and pays for it.",
 )

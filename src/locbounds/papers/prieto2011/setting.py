@@ -53,8 +53,8 @@ def scenario(
     case
         ``"rss"``, ``"toa"`` or ``"fusion"``.
     noise
-        ``"cut"``: as in the paper; ``"regular"``: the Gaussian laws are not cut (another model); ``"believed"``: what the
-        paper's filter takes them for, all Gaussian.
+        ``"cut"``: as in the paper; ``"regular"``: the Gaussian laws are not cut (another model); ``"believed"``: what
+        the paper's filter takes them for, all Gaussian.
     common
         One bias for all samples of a second, instead of one for each.
     samples, steps
