@@ -160,8 +160,8 @@ METHODS: dict[str, Method] = {
             RANGES,
             "locbounds.bounds.weinstein:wwb_recursive",
             ("any noise",),
-            "Loose for noises with hard edges, by some per cent to a third in the root; where modes remember, it is that of "
-            "estimators that are told them.",
+            "Loose for noises with hard edges, by some per cent to a third in the root; where modes remember, it is "
+            "that of estimators that are told them.",
             ("weiss1985", "rapoport2004"),
             (LINEAR_MOTION, LINEAR_CHANNELS),
             subject="model",

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import locbounds as lb
+from distances import STEPS, cut, model, rss, toa, track
 from locbounds.filters import Estimates
 from locbounds.noise import Epoch
 from locbounds.precision import double_precision
@@ -19,9 +20,8 @@ from locbounds.ranging import (
     measure,
 )
 from locbounds.ranging.likelihood import table
-from distances import STEPS, cut, model, rss, toa, track
 
-SIGMAS, RUNS, PARTICLES = 4.0, 320, 1_500
+SIGMAS, RUNS, PARTICLES = 4.0, 160, 1_500
 
 
 def mean_mse(result):
@@ -33,11 +33,11 @@ def mean_mse(result):
 def test_an_ekf_that_is_linear_has_the_error_it_says():
     """The best linear filter depends on the moments of the noise only: its own variance is its error, exactly."""
     one = model(toa(noise=cut(3.5), common=True))
-    result = evaluate_distance(DistanceEkf(), one, runs=2_000)
+    result = evaluate_distance(DistanceEkf(), one, runs=RUNS)
     variance = 3.5**2 * 0.7737 / 10 + 9 / 12  # a Gaussian cut at two deviations keeps 77.37 % of its variance
-    exact = distance_bcrb(
-        model(toa(bias=None)), given=np.full(STEPS, toa().cycles_per_m ** 2 / variance)
-    ).position_mse[1:]
+    exact = distance_bcrb(model(toa(bias=None)), given=np.full(STEPS, toa().cycles_per_m ** 2 / variance)).position_mse[
+        1:
+    ]
     z = measure(one.sensors, np.full((1, STEPS), 20.0))
     np.testing.assert_allclose(DistanceEkf()(one, z).covariance[0, 1:, 0, 0], exact, rtol=1e-4)
     found, error, _ = mean_mse(result)
@@ -55,7 +55,7 @@ def test_particles_reach_the_bound_of_the_regular_model():
     controlled = particles - (linear - known)
     found, error = controlled.mean(), controlled.std(ddof=1) / np.sqrt(RUNS)
     assert abs(found - bound) < 0.01 * bound + SIGMAS * error
-    assert error < 0.01 * bound
+    assert error < 0.02 * bound
 
 
 def test_particles_of_cut_noise_lie_between_weiss_weinstein_and_the_ekf():
@@ -77,7 +77,7 @@ def test_particles_agree_with_a_grid_on_one_signal_strength():
     noise, bias = cut(1.6), cut(3.0)
     one = model(rss(noise=noise, bias=bias, samples=4), times=lb.Times.uniform(step_s=1.0, steps=1))
     z = measure(one.sensors, np.full((32, 1), 18.0), seed=3)
-    got = DistanceParticles(8_000)(one, z, 0)
+    got = DistanceParticles(4_000)(one, z, 0)
     x = np.linspace(5.0, 45.0, 16_001)
     prior = np.exp(-((x - 20.0) ** 2) / 2 / (4.0 + 0.25 + 0.25 * 0.5625 + 1 / 36))
     values = double_precision(lambda e: (noise + bias).log_prob(jnp.asarray(e)))
@@ -87,15 +87,15 @@ def test_particles_agree_with_a_grid_on_one_signal_strength():
         p /= p.sum()
         mean = p @ x
         std = np.sqrt(p @ (x - mean) ** 2)
-        assert abs(got.mean[run, 1, 0] - mean) < 5 * std / np.sqrt(8_000 * 0.3)
+        assert abs(got.mean[run, 1, 0] - mean) < 5 * std / np.sqrt(4_000 * 0.3)
         assert got.covariance[run, 1, 0, 0] == pytest.approx(std**2, rel=0.1)
 
 
 def test_steps_without_a_particle_in_the_support_are_counted_and_recovered():
     """Truth far outside of what the prior expects: all particles contradict the first samples."""
-    sharp = model(toa(noise=cut(0.2), bias=lb.Uniform(0.0, 0.3), samples=3))
+    sharp = model(toa(noise=cut(0.2), bias=lb.Uniform(0.0, 0.3)))
     far = 20.0 + 30.0 + 0.0 * track()
-    result = evaluate_distance(DistanceParticles(300), sharp, runs=32, track=far)
+    result = evaluate_distance(DistanceParticles(PARTICLES), sharp, runs=RUNS, track=far)
     assert np.all(result.diagnostics["stranded"] >= 1)
     assert np.all(np.isfinite(result.diagnostics["error_m"]))
     assert np.all(result.diagnostics["error_m"][:, 1] < 2.0)

@@ -14,6 +14,9 @@ def prieto2011(folder: Any, *, samples: int | None, runs: int | None, data: Path
     from locbounds.papers.prieto2011.study import study
     from locbounds.report.tables import csv_text
 
+    survey, missing = _survey(data)
+    with status("prieto2011: starting") as say:
+        found = study(samples=samples, runs=runs, seed=seed, announce=lambda text: say(f"prieto2011: {text}"))
     for name, figure, unit, title in (
         ("fig1", densities.FIG1, "dB", "Signal strength: density of the error"),
         ("fig2", densities.FIG2, "cycles", "Time of arrival: density of the error"),
@@ -21,17 +24,17 @@ def prieto2011(folder: Any, *, samples: int | None, runs: int | None, data: Path
         folder.write_text(f"{name}.csv", densities.csv_of(figure))
         picture = densities.draw(figure, unit, title)
         folder.write(f"{name}.png", lambda path, picture=picture: picture.savefig(path, dpi=150))
-    with status("prieto2011: starting") as say:
-        found = study(samples=samples, runs=runs, seed=seed, announce=lambda text: say(f"prieto2011: {text}"))
     folder.write_text("fig3.csv", outputs.fig3_csv(found))
     folder.write_text("as-printed.csv", outputs.drift_csv(found))
     folder.write_text("settings.csv", outputs.settings_csv(found))
     figure = outputs.fig3(found)
     folder.write("fig3.png", lambda path: figure.savefig(path, dpi=150))
-    measured, missing = _measured(data)
-    if measured:
+    measured = []
+    if survey is not None:
         from locbounds.papers.prieto2011 import measured as real
 
+        with status("prieto2011: measured distances"):
+            measured = real.compare(survey, seed=seed)
         folder.write_text("measured.csv", csv_text(real.COLUMNS, measured))
     said = outputs.remarks(found)
     if json:
@@ -58,23 +61,22 @@ def prieto2011(folder: Any, *, samples: int | None, runs: int | None, data: Path
     typer.echo(f"\nwrote {', '.join(str(path) for path in folder.written)}")
 
 
-def _measured(data: Path | None) -> tuple[list[Any], str]:
-    """The comparison on measured distances, or why there is none."""
+def _survey(data: Path | None) -> tuple[Path | None, str]:
+    """The folder of measured distances, or why there is none."""
     import os
 
     from locbounds.errors import InputError
-    from locbounds.papers.prieto2011 import measured as real
+    from locbounds.papers.prieto2011.measured import FOLDER
 
     named = data or os.environ.get("LOCBOUNDS_DATA")
     if not named:
-        return [], f"measured distances: name the folder that holds {real.FOLDER} with --data or in LOCBOUNDS_DATA"
-    folder = Path(named).expanduser() / real.FOLDER
-    if not folder.is_dir():
-        if data is not None:
-            raise InputError(f"there is no folder {folder}", "Check --data")
-        return [], f"measured distances: there is no {folder}"
-    with status("prieto2011: measured distances"):
-        return real.compare(folder), ""
+        return None, f"measured distances skipped: name the folder that holds {FOLDER} with --data or in LOCBOUNDS_DATA"
+    folder = Path(named).expanduser() / FOLDER
+    if folder.is_dir():
+        return folder, ""
+    if data is not None:
+        raise InputError(f"there is no folder {folder}", "Check --data")
+    return None, f"measured distances skipped: there is no {folder}"
 
 
 def _print(found: Any, said: list[str], measured: list[Any], missing: str) -> None:

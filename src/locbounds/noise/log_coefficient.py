@@ -24,6 +24,7 @@ LEAST = -80.0  # logarithm of the smallest coefficient that is tabulated
 GROWTH = 1.25  # of the shift, while looking for where the coefficient has become negligible
 MOST = 1e6  # deviations
 KEPT = 32  # tables
+AT_ONCE = 160  # shifts
 
 
 @double_precision
@@ -44,8 +45,9 @@ def log_bhattacharyya(noise: Noise, shifts: Float[Array, "*n"]) -> Float[Array, 
     array([-1.e-12, -1.6e+01])
     """
     shifts = np.asarray(shifts, dtype=float)
-    low, high = _over(noise, jnp.asarray(shifts.ravel()))
-    low, high = np.asarray(low), np.asarray(high)
+    padded = np.zeros(-(-shifts.size // AT_ONCE) * AT_ONCE)  # few shapes, each of which is compiled
+    padded[: shifts.size] = shifts.ravel()
+    low, high = (np.asarray(x)[: shifts.size] for x in _over(noise, jnp.asarray(padded)))
     with np.errstate(divide="ignore"):
         value = np.where(low < 0.5, np.log1p(-np.minimum(low, 0.5)), np.log(high))
     return value.reshape(shifts.shape)

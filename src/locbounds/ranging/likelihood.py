@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float
+from locbounds.axes import Array, Bool, Float
 from locbounds.noise import Noise
 from locbounds.precision import double_precision
 
@@ -29,7 +29,7 @@ class Table(NamedTuple):
     low: Float[Array, ""]
     step: Float[Array, ""]
     values: Float[Array, " points"]
-    bounded: bool
+    bounded: Bool[Array, ""]
 
     def log_prob(self, e: Float[Array, "*n"]) -> Float[Array, "*n"]:
         """Log-density of an error, minus infinity outside a bounded support."""
@@ -37,10 +37,9 @@ class Table(NamedTuple):
         i = jnp.clip(jnp.floor(x), 0, POINTS - 2).astype(int)
         a, b = self.values[i], self.values[i + 1]
         value = a + (x - i) * (b - a)
-        if not self.bounded:
-            return value  # beyond the ends the last slope goes on
-        inside = (x >= 0) & (x <= POINTS - 1) & (value > 0)
-        return jnp.where(inside, jnp.log(jnp.where(inside, value, 1.0)), -jnp.inf)
+        inside = self.bounded & (x >= 0) & (x <= POINTS - 1) & (value > 0)
+        hard = jnp.where(inside, jnp.log(jnp.where(inside, value, 1.0)), -jnp.inf)
+        return jnp.where(self.bounded, hard, value)  # a soft law goes on with the last slope
 
 
 @double_precision
@@ -60,7 +59,7 @@ def table(noise: Noise) -> Table:
     places = np.linspace(low, high, POINTS)
     log_p = np.asarray(noise.log_prob(jnp.asarray(places)))
     values = np.exp(log_p) if bounded else np.maximum(log_p, -700.0)
-    return Table(jnp.asarray(low), jnp.asarray(places[1] - places[0]), jnp.asarray(values), bounded)
+    return Table(jnp.asarray(low), jnp.asarray(places[1] - places[0]), jnp.asarray(values), jnp.asarray(bounded))
 
 
 def limits(noise: Noise) -> tuple[float, float]:

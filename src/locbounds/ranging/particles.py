@@ -1,5 +1,6 @@
 """Particle filter of a distance that stays alive where likelihoods have hard edges."""
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
@@ -12,8 +13,9 @@ from locbounds.axes import Array, Float, Int, ndarray
 from locbounds.blocks import check_seed
 from locbounds.errors import InputError
 from locbounds.filters import Estimates
+from locbounds.noise import Gaussian
 from locbounds.precision import double_precision
-from locbounds.ranging.likelihood import Table, limits, table
+from locbounds.ranging.likelihood import limits, table
 from locbounds.ranging.model import DistanceModel
 
 AT_ONCE = 32  # runs
@@ -83,18 +85,18 @@ class DistanceParticles(eqx.Module):
             for s in z
         )
         keys = jax.random.split(jax.random.key(check_seed(seed)), padded // AT_ONCE)
-        tables = [table(noise) for noise in laws]
-        arrays = tuple(t[:3] for t in tables)
-        motion = _conditional(model)
+        plain = tuple(  # their laws are in the tables: one compiled filter for all of them
+            dataclasses.replace(sensor, noise=Gaussian(0.0, 1.0), bias=None, samples=1, common=False)
+            for sensor in model.sensors
+        )
         mean, variance, stranded = _filter(
-            motion,
-            model.sensors,
-            arrays,
+            _conditional(model),
+            plain,
+            tuple(table(noise) for noise in laws),
             samples,
             keys,
+            jnp.asarray([limits(noise) for noise in laws]),
             particles=self.particles,
-            bounded=tuple(t.bounded for t in tables),
-            ends=tuple(limits(noise) for noise in laws),
         )
         shape = (padded, model.steps + 1)
         return Estimates(
@@ -174,14 +176,13 @@ def _conditional(model: DistanceModel) -> _Motion:
 
 
 @eqx.filter_jit
-def _filter(motion, sensors, arrays, samples, keys, *, particles, bounded, ends):
-    tables = [Table(*a, b) for a, b in zip(arrays, bounded, strict=True)]
+def _filter(motion, sensors, tables, samples, keys, ends, *, particles):
     return jax.lax.map(
         lambda piece: _some_runs(motion, sensors, tables, piece[0], piece[1], particles, ends), (samples, keys)
     )
 
 
-def _some_runs(motion: _Motion, sensors: Any, tables: list[Table], z: Any, key: Any, N: int, ends: Any) -> Any:
+def _some_runs(motion: _Motion, sensors: Any, tables: Any, z: Any, key: Any, N: int, ends: Any) -> Any:
     """[runs, times, state] means, covariances, and how many steps had no particle in the support."""
     runs, n = z[0].shape[0], len(motion.mean)
     start, go = jax.random.split(key)
@@ -202,7 +203,8 @@ def _some_runs(motion: _Motion, sensors: Any, tables: list[Table], z: Any, key: 
     def possible(here):
         """Limits that bounded errors set to the distance."""
         low, high = jnp.full(runs, -jnp.inf), jnp.full(runs, jnp.inf)
-        for sensor, (a, b), s in zip(sensors, ends, here, strict=True):
+        for m, (sensor, s) in enumerate(zip(sensors, here, strict=True)):
+            a, b = ends[m]
             one, two = sensor.inverse(s.max(1) - b), sensor.inverse(s.min(1) - a)
             low = jnp.maximum(low, jnp.minimum(one, two))
             high = jnp.minimum(high, jnp.maximum(one, two))

@@ -57,7 +57,7 @@ def draw(figure: dict[str, tuple[Noise, Noise]], unit: str, title: str) -> "Figu
     """Densities of the cases side by side, with those of noise and bias."""
     from matplotlib.figure import Figure
 
-    picture = Figure(figsize=(9.0, 3.6), layout="constrained")
+    picture = Figure(figsize=(9.0, 3.9), layout="constrained")
     panels = np.atleast_1d(picture.subplots(1, len(figure)))
     for ax, (name, (e, p)) in zip(panels, curves(figure).items(), strict=True):
         for part, label, style in zip(figure[name], ("noise", "bias"), ("--", ":"), strict=True):
@@ -67,6 +67,7 @@ def draw(figure: dict[str, tuple[Noise, Noise]], unit: str, title: str) -> "Figu
         ax.set(xlabel=f"error in {unit}", title=name, ylim=(0, None))
         ax.title.set_fontsize(10)
     panels[0].set_ylabel(f"density in 1/{unit.rstrip('s')}")
-    panels[0].legend(frameon=False, fontsize=8, loc="lower center")
+    handles, labels = panels[0].get_legend_handles_labels()
+    picture.legend(handles, labels, frameon=False, fontsize=9, loc="outside lower center", ncols=4)
     picture.suptitle(title, x=0.01, ha="left", fontsize=11)
     return picture

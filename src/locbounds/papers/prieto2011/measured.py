@@ -263,10 +263,12 @@ def _rmse(error: Float[ndarray, " n"], point: ndarray) -> tuple[float, float]:
 WHY = (
     "Samples of one block share their bias. A Cramér-Rao number that draws it anew for every sample promises what no "
     "estimator reaches, and averaging more samples does not help.",
-    "With the bias of the block, one block is one observation. The Cramér-Rao number is attained for Gaussian laws only: "
-    "where the bias is skewed it asks for many blocks, and the best that one block permits is the deviation of the law.",
-    "The posterior mean is the best estimator if laws and prior (the training distances) are right. What it reaches on "
-    "test points differs from what they predict because one law stands for all places and anchors.",
-    "It beats the Cramér-Rao number where strengths say little: that holds for unbiased estimators at a given distance, "
-    "and the prior shrinks. Inverting the path loss multiplies the distance by a random factor, and pays for it.",
+    "With the bias of the block, one block is one observation. The Cramér-Rao number is attained for Gaussian laws "
+    "only: where the bias is skewed it asks for many blocks, and an estimator that follows shifts has at best the "
+    "deviation of the law.",
+    "The posterior mean is the best estimator if laws and prior (the training distances) are right. What it reaches "
+    "on test points differs from what they predict because one law stands for all places and anchors.",
+    "It beats the Cramér-Rao number where strengths say little: that number is for unbiased estimators at a given "
+    "distance, and a prior shrinks. Inverting the path loss multiplies the distance by a random factor, and pays for "
+    "it: its error grows with the distance.",
 )

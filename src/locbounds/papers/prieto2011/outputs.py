@@ -73,7 +73,11 @@ def fig3(found: Study) -> "Figure":
             if c.stderr_m.any():
                 low, high = c.rmse_m - 2 * c.stderr_m, c.rmse_m + 2 * c.stderr_m
                 ax.fill_between(t, low, high, color=_style(c)["color"], alpha=0.15, lw=0)
-        ax.set_title(f"{TITLES[case]}, one trajectory" if case in TITLES else case, loc="left", fontsize=11)
+        ax.set_title(
+            f"{TITLES[case]}, one trajectory" if case in TITLES else "time of arrival, random tracks",
+            loc="left",
+            fontsize=11,
+        )
         ax.set_ylim(0, None)
         ax.grid(alpha=0.3)
         ax.legend(frameon=False, fontsize=8)
@@ -106,24 +110,24 @@ def remarks(found: Study) -> list[str]:
     random = {m: last(found, RANDOM, m)[0] for m in (REGULAR, WEINSTEIN, EKF, PARTICLES)}
     alone, fused = (last(found, case, PARTICLES)[0] for case in ("rss", "fusion"))
     return [
-        '"This expression has no closed-form solution and its result has to be obtained by Monte Carlo": does not hold. '
-        "Both densities vanish linearly at their ends, the Fisher information is infinite and the exact bound 0; a "
-        f"Monte Carlo value depends on its draws (one evaluation: {grown}). Without the cut it is one integral.",
-        f"The noise that is not cut is another model with more variance. Its bound, {random[REGULAR]:.2f} m for times of "
-        f"arrival over random tracks, lies above what filters reach on the cut noise ({random[PARTICLES]:.2f} m) and "
-        f"bounds nothing there; Weiss-Weinstein does, {random[WEINSTEIN]:.2f} m.",
-        '"The PCRLB ... for each position of the simulated trajectory": holds as a conditional number only. The '
+        '"This expression has no closed-form solution and its result has to be obtained by Monte Carlo": does not '
+        "hold. Both densities vanish linearly at their ends, the Fisher information is infinite and the exact bound 0; "
+        f"a Monte Carlo value depends on its draws (one evaluation: {grown}). Without the cut it is one integral.",
+        f"The noise that is not cut is another model with more variance. Its bound, {random[REGULAR]:.2f} m for times "
+        f"of arrival over random tracks, lies above what filters reach on the cut noise ({random[PARTICLES]:.2f} m) "
+        f"and bounds nothing there; Weiss-Weinstein does, {random[WEINSTEIN]:.2f} m.",
+        '"The accumulated PCRLB in each position" of the trajectory: holds as a conditional number only. The '
         "trajectory is far smoother than the model's, and starts where the prior says, so that filters may lie below "
         "numbers that bound the error over random tracks. With signal strengths a bound over random tracks does not "
         "exist, because E[1/d^2] is infinite.",
-        '"The error introduced by the EKF": small. In root mean square an accurate particle filter gains on an EKF with '
-        f"matched moments {matched}, and on the one as printed {printed}: that the EKF is far from optimal is not "
+        '"The error introduced by the EKF": small. In root mean square an accurate particle filter gains on an EKF '
+        f"with matched moments {matched}, and on the one as printed {printed}: that the EKF is far from optimal is not "
         "supported.",
         f'"The improvement ... by means of the RSS and TOA data fusion": holds; particle filter {alone:.2f} m from '
         f"signal strengths alone, {fused:.2f} m with both.",
-        f"Ten biases per second are optimistic: with one per second the signal-strength bound goes from {many:.2f} to "
-        f"{one:.2f} m. Taking the prior of the derivatives as a measurement of every second counts one fact many times "
-        f"({once:.2f} to {every:.2f} m, fusion): over-confident.",
+        f"Ten biases per second are optimistic: with one per second the signal-strength bound goes from {many:.2f} "
+        f"to {one:.2f} m. Taking the prior of the derivatives as a measurement of every second counts one fact many "
+        f"times ({once:.2f} to {every:.2f} m, fusion): over-confident.",
         f"Steps at which no particle explained the samples: {found.stranded}, counted and recovered.",
     ]
 

@@ -1,7 +1,7 @@
 """Fig. 3 three ways: as printed, with noise that is not cut, and with a bound that needs no information."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -188,8 +188,8 @@ def study(
     return Study(curves, drifts, settings(steps), gains, stranded, runs)
 
 
-def gain(worse: Result, better: Result) -> tuple[float, float]:
-    """By how much one RMSE over steps 1..K is below another one, relative, and its standard error from paired runs."""
+def gain(worse: Any, better: Any) -> tuple[float, float]:
+    """By how much one result's RMSE over steps 1..K is below another's, relative, and its standard error; paired runs."""
     errors = [np.asarray(r.diagnostics["error_m"])[:, 1:] ** 2 for r in (worse, better)]
     a, b = (e.mean(1) for e in errors)
     ratio = b.mean() / a.mean()
