@@ -91,7 +91,7 @@ def wwb_recursive(
     ...     chains=lb.MarkovSight([1.0], [[1.0]]),
     ... )
     >>> wwb_recursive(model).position_rmse.values.round(2)
-    array([2.  , 0.45, 0.33, 0.32, 0.31])
+    array([2.  , 0.43, 0.32, 0.31, 0.3 ])
     """
     model = jump_markov(model) if isinstance(model, Scenario) else model
     horizon = Horizon.parse(horizon, model.steps)

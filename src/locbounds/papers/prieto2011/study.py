@@ -189,7 +189,7 @@ def study(
 
 
 def gain(worse: Any, better: Any) -> tuple[float, float]:
-    """By how much one result's RMSE over steps 1..K is below another's, relative, and its standard error; paired runs."""
+    """By how much one RMSE over steps 1..K is below another one, relative, with a standard error from paired runs."""
     errors = [np.asarray(r.diagnostics["error_m"])[:, 1:] ** 2 for r in (worse, better)]
     a, b = (e.mean(1) for e in errors)
     ratio = b.mean() / a.mean()
