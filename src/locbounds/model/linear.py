@@ -85,9 +85,10 @@ def _view(model: JumpMarkov, channel: Any) -> ndarray:
 def _at_places(model: JumpMarkov, c: int) -> tuple[ndarray, ndarray]:
     """Values [modes, places, steps] and gradients [modes, places, steps, view] of a channel's h."""
     channel: Any = model.channels[c]
+    prior: Any = model.prior
     rng = np.random.default_rng(0)
-    spread = np.sqrt(np.diag(np.asarray(model.prior.covariance)))
-    places = np.asarray(model.prior.mean) + (1 + spread) * rng.normal(size=(PLACES, model.state_size))
+    spread = np.sqrt(np.diag(np.asarray(prior.covariance)))
+    places = np.asarray(prior.mean) + (1 + spread) * rng.normal(size=(PLACES, model.state_size))
     k = jnp.arange(1, model.steps + 1)
     values, slopes = [], []
     for mode in range(len(channel.noises)):

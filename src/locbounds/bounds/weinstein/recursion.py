@@ -60,7 +60,7 @@ def weiss_weinstein_recursion(
         What the measurements say.
     """
     information = [np.linalg.inv(P0), *np.linalg.inv(Q)]
-    carried, used, bounds = None, None, []
+    carried, used, bounds = np.zeros((0, 0)), np.zeros(0, bool), []
     for k, h in enumerate(shifts):
         cross = None
         log_rho = [coefficients.single(k, u) for u in (h[:, None] - h, h[:, None] + h, h)]

@@ -1,5 +1,6 @@
 """Figs. 1 and 2: the densities of signal strength and time of arrival."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
@@ -14,6 +15,8 @@ from locbounds.report.tables import csv_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Densities = Mapping[str, tuple[Noise, Noise]]
+"""Noise and bias of every case of a figure, by name."""
 POINTS = 401
 COLUMNS = ("case", "error", "density")
 FIG1 = {
@@ -36,7 +39,7 @@ def density(noise: Noise, e: ndarray) -> ndarray:
     return np.exp(np.asarray(noise.log_prob(jnp.asarray(e))))
 
 
-def curves(figure: dict[str, tuple[Noise, Noise]]) -> dict[str, tuple[ndarray, ndarray]]:
+def curves(figure: Densities) -> dict[str, tuple[ndarray, ndarray]]:
     """Errors and densities of every case of a figure."""
     found = {}
     for name, (noise, bias) in figure.items():
@@ -47,13 +50,13 @@ def curves(figure: dict[str, tuple[Noise, Noise]]) -> dict[str, tuple[ndarray, n
     return found
 
 
-def csv_of(figure: dict[str, tuple[Noise, Noise]]) -> str:
+def csv_of(figure: Densities) -> str:
     """``fig1.csv`` or ``fig2.csv``; errors in dB or clock cycles."""
     rows = [(name, float(e), float(p)) for name, (x, y) in curves(figure).items() for e, p in zip(x, y, strict=True)]
     return csv_text(COLUMNS, rows)
 
 
-def draw(figure: dict[str, tuple[Noise, Noise]], unit: str, title: str) -> "Figure":
+def draw(figure: Densities, unit: str, title: str) -> "Figure":
     """Densities of the cases side by side, with those of noise and bias."""
     from matplotlib.figure import Figure
 

@@ -116,7 +116,7 @@ def accumulated(mse: Float[ndarray, "*n times"]) -> Float[ndarray, "*n steps"]:
 
 
 def _of(case: str, method: str, result: Result, valid: str) -> Curve:
-    root = accumulated(result.position_mse)
+    root = accumulated(np.asarray(result.position_mse))
     spread = np.asarray(result.replicates)[:, 1:]
     spread = np.cumsum(spread, 1) / np.arange(1, spread.shape[1] + 1) / (2 * root)
     error = np.zeros_like(root) if len(spread) < 2 else np.asarray(standard_error(spread))
@@ -244,5 +244,5 @@ def settings(steps: int = STEPS) -> list[Setting]:
             model = scenario(case, noise="regular", common=common, steps=steps)
             for derivatives in ("initial", "every step"):
                 bound = distance_bcrb(model, track=trajectory(steps), derivatives=derivatives)
-                rows.append(Setting(case, bias, derivatives, float(accumulated(bound.position_mse)[-1])))
+                rows.append(Setting(case, bias, derivatives, float(accumulated(np.asarray(bound.position_mse))[-1])))
     return rows
