@@ -171,3 +171,18 @@ def test_what_cannot_be_done_while_traced_is_refused():
 def test_float64_leaves_none_alone():
     assert float64(None) is None
     assert float64([1, 2]).dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [lb.StudentT(4.5, 1.0, 2.0), lb.LogNormal(2.0, 0.7), lb.Gamma(3.5, 2.0)],
+    ids=["Student", "log-normal", "gamma"],
+)
+def test_a_noise_answers_in_double_precision(noise):
+    assert not jax.config.jax_enable_x64  # pyright: ignore[reportAttributeAccessIssue]
+    w, q = np.array(1.0), np.array(0.3)
+    answers = [noise.mean, noise.variance, noise.log_prob(w), noise.score(w), noise.cdf(w), noise.quantile(q)]
+    answers += [noise.sample(jax.random.key(0), (2,)), noise.information(), noise.expect(abs)]
+    assert {np.asarray(a).dtype for a in answers} == {np.dtype(np.float64)}
+    with jax.enable_x64(True):
+        assert noise.cdf(w) == answers[4]

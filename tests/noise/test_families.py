@@ -187,3 +187,14 @@ def test_filters_see_moments_or_quartiles():
 def test_numbers_that_are_no_law_are_input_errors(build, match):
     with pytest.raises(lb.InputError, match=match):
         build()
+
+
+def test_the_modified_gaussian_far_below_its_mean():
+    """A wide sibling mode draws there: no place may be impossible (a function of JAX underflows in a narrow window)."""
+    noise, w = lb.ExponentiallyModifiedGaussian(0.0, 1.0, 1.0), np.linspace(-45.0, -15.0, 3001)
+    with jax.enable_x64(True):
+        log_prob, score = noise.log_prob(w), noise.score(w)
+    np.testing.assert_allclose(log_prob, stats.exponnorm(1.0).logpdf(w), rtol=2e-12)
+    h = 1e-4
+    slope = (stats.exponnorm(1.0).logpdf(w + h) - stats.exponnorm(1.0).logpdf(w - h)) / (2 * h)
+    np.testing.assert_allclose(score, -slope, rtol=1e-7)

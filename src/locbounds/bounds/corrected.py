@@ -24,6 +24,7 @@ FIRST_WINDOW = 2
 LONGEST_WINDOW = 32  # longer ones are taken only where asked for: work per step grows with their square
 FEWEST_GROUPS = 16  # for so many links that these are draws enough
 DRAWS = 3072  # link by link, per block: with fewer links more paths are drawn
+PILOT = 4  # groups that make V, as a share of the others: an error of V matters to second order only
 
 
 class _Sums(NamedTuple):
@@ -66,7 +67,7 @@ def _blocks(scenario, expectation, rtol, samples, seed, window, progress):
                 increments,
                 groups=groups,
                 paths=paths,
-                pilot=groups,
+                pilot=groups // PILOT,
                 window=size,
             )
             increments = (block * increments + one.increments) / (block + 1)

@@ -32,11 +32,12 @@ def extrapolated(
     -----
     The changes on shortening the window by a quarter and by a half say how fast they decay with its length:
     geometrically with a ratio q per quarter, ``half / quarter = (1 + q) / q``, and what was left out makes
-    ``quarter * q / (1 - q)``. Where that is less than the last quarter itself, that quarter is reported; where nothing
-    decays, the last quarter as often as quarters were left out.
+    ``quarter * q / (1 - q)``, or the last quarter as often as quarters were left out where nothing decays. The decay
+    slows where a chain has several time scales, so that the last quarter itself is added: what is reported is the error
+    that the window shortened by a quarter would have.
     """
     mse = np.asarray(position_mse)
     relative = np.abs(shorter) / (2 * np.where(mse > 0, mse, 1.0))
     quarter, half = (float(change.max()) for change in relative)
     beyond = quarter / (half - 2 * quarter) if half > 2 * quarter else np.inf  # q / (1 - q)
-    return quarter * max(1.0, min(beyond, 4 * (steps - window) / window))
+    return quarter * (1.0 + min(beyond, 4 * (steps - window) / window))

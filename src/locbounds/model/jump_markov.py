@@ -115,7 +115,8 @@ class JumpMarkov(eqx.Module):
                     f"{self.steps}",
                     "Give one truth value per step 1..K",
                 )
-        self._check_shapes()
+        with jax.enable_x64(True):
+            self._check_shapes()
 
     def _check_modes(self, what: str, modes: int | None, chain: int) -> None:
         if not 0 <= chain < len(self.chains):
@@ -126,7 +127,7 @@ class JumpMarkov(eqx.Module):
             )
 
     def _check_shapes(self) -> None:
-        """Call every function once, without computing: wrong shapes are found here and not inside the engine."""
+        """Trace every function once, without computing: wrong shapes are found here and not inside the engine."""
         key, k = jax.random.key(0), jax.ShapeDtypeStruct((), jnp.result_type(int))
         x = jax.ShapeDtypeStruct((self.state_size,), jnp.result_type(float))
 

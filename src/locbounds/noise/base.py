@@ -13,10 +13,11 @@ from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError
 from locbounds.noise.regularity import Regularity, declared
 from locbounds.noise.singularity import Pieces, Singularity
-from locbounds.precision import traced
+from locbounds.precision import double_precision, traced
 
 EVERYWHERE: Pieces = ((-np.inf, np.inf),)
 BREAKS = np.array([-40, -20, -10, -8, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6, 8, 10, 20, 40.0])  # in deviations
+IN_DOUBLE = {"mean", "variance", "log_prob", "sample", "information", "score", "expect", "cdf", "quantile"}
 HALVINGS = 60  # bisections of a bracket of landmarks: below the spacing of doubles
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
@@ -29,10 +30,20 @@ class Noise(eqx.Module):
     that is not smooth on the whole line declares its ``support`` and its ``singularities``; a law that declares
     nothing is examined as a black box (:mod:`locbounds.noise.black_box`).
 
-    ``a + b`` is the law of the sum of two independent noises.
+    ``a + b`` is the law of the sum of two independent noises. What a user asks of a noise is computed in double
+    precision, also in classes of one's own.
     """
 
     mean: eqx.AbstractVar[Scalar]
+
+    def __init_subclass__(cls, **kwargs):
+        for name in IN_DOUBLE & vars(cls).keys():
+            own = vars(cls)[name]
+            if isinstance(own, property) and own.fget:
+                setattr(cls, name, property(double_precision(own.fget), doc=own.__doc__))
+            elif callable(own):
+                setattr(cls, name, double_precision(own))
+        super().__init_subclass__(**kwargs)
 
     @property
     @abstractmethod
@@ -83,17 +94,20 @@ class Noise(eqx.Module):
             return examine(self)
         return declared(places, self.support(), type(self).__name__)
 
+    @double_precision
     def information(self) -> Scalar:
         """Intrinsic accuracy ``E[score(w)^2]`` in 1/m^2: the Fisher information about a shift; may be infinite."""
         if not traced(self) and self.regularity().finite is False:
             return np.inf
         return _accuracy(self)
 
+    @double_precision
     def score(self, w: Float[Array, "*n"]) -> Float[Array, "*n"]:
         """Location score ``-d log p(w) / dw``, elementwise: the derivative of ``log p(z - h)`` with respect to h."""
         w = jnp.asarray(w)
         return -jax.jvp(self.log_prob, (w,), (jnp.ones_like(w),))[1]
 
+    @double_precision
     def expect(self, function: Callable[[Array], Array]) -> Scalar:
         """Mean of a function of the noise, by Gauss-Legendre quadrature between landmarks."""
         places = self.landmarks()
@@ -105,10 +119,12 @@ class Noise(eqx.Module):
         values = jnp.where(there, function(jnp.where(there, w, likely)), 0.0)
         return jnp.sum(half[:, None] * _WEIGHTS * jnp.where(there, jnp.exp(log_p), 0.0) * values)
 
+    @double_precision
     def cdf(self, w: Float[Array, "*n"]) -> Float[Array, "*n"]:
         """Distribution function, elementwise."""
         return self._mass_below(jnp.asarray(w))
 
+    @double_precision
     def quantile(self, q: Float[Array, "*n"]) -> Float[Array, "*n"]:
         """Inverse of the distribution function, elementwise; bisection between landmarks."""
         q, places = jnp.asarray(q), self.landmarks()

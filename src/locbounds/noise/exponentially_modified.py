@@ -3,6 +3,7 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.scipy.special import log_ndtr, ndtr
 
 from locbounds.axes import Array, Float, Scalar
@@ -12,14 +13,24 @@ from locbounds.noise.singularity import Singularity
 from locbounds.noise.special import log_normal_density
 from locbounds.precision import float64, traced
 
+FAR_OUT = 30.0
+SERIES = np.append(np.cumprod(-np.arange(1.0, 16.0, 2.0))[::-1], 0.0)  # -1, 3, -15, ... of 1/x^2, highest first
+
 
 def log_tail(x: Array) -> Array:
-    """``log(Phi(-x) / phi(x))``, the logarithm of the Mills ratio, without cancellation in either tail."""
+    """``log(Phi(-x) / phi(x))``, the logarithm of the Mills ratio, without cancellation in either tail.
+
+    Far out by its asymptotic series ``(1 - 1/x^2 + 3/x^4 - 15/x^6 ...) / x``: JAX's ``erfcx`` is zero near 26.6.
+    """
     from jax.scipy.special import erfcx
 
-    large = jnp.log(erfcx(jnp.where(x > 0, x, 0.0) / jnp.sqrt(2.0))) + 0.5 * jnp.log(jnp.pi / 2)
+    middle = jnp.where((x > 0) & (x <= FAR_OUT), x, 1.0)
+    middle = jnp.log(erfcx(middle / jnp.sqrt(2.0))) + 0.5 * jnp.log(jnp.pi / 2)
+    far = jnp.where(x > FAR_OUT, x, FAR_OUT)
+    far = jnp.log1p(jnp.polyval(SERIES, 1 / far**2)) - jnp.log(far)
     small = jnp.where(x > 0, 0.0, x)
-    return jnp.where(x > 0, large, log_ndtr(-small) - log_normal_density(small))
+    below = log_ndtr(-small) - log_normal_density(small)
+    return jnp.where(x > FAR_OUT, far, jnp.where(x > 0, middle, below))
 
 
 class ExponentiallyModifiedGaussian(Noise):
