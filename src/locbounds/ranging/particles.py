@@ -122,8 +122,7 @@ def _looked_up(
     inside = (x >= 0) & (x <= NODES - 1) & (step > 0)
     both = (a > -jnp.inf) & (b > -jnp.inf)
     smooth = jnp.where(both, a, 0.0) + share * (jnp.where(both, b, 0.0) - jnp.where(both, a, 0.0))
-    top = jnp.maximum(jnp.maximum(a, b), -1e300)
-    edge = top + jnp.log((1 - share) * jnp.exp(a - top) + share * jnp.exp(b - top))
+    edge = jnp.maximum(a, b) + jnp.log(jnp.where(a > -jnp.inf, 1 - share, share))
     return jnp.where(inside, jnp.where(both, smooth, edge), -jnp.inf)
 
 
