@@ -163,10 +163,10 @@ def test_a_chain_that_is_told_agrees_with_the_dense_gram_matrix_over_all_its_seq
         assert got.position_mse[k] == pytest.approx(float(target @ np.linalg.solve(G, target)), rel=TABLE)
 
 
-def grid_mmse(model, densities, told, runs=400, seed=0):
+def grid_mmse(model, densities, told, runs=200, seed=0):
     """Mean of the posterior variance at step 3 over draws, by a filter on a grid of places (and modes)."""
     rng = np.random.default_rng(seed)
-    x = np.linspace(-9.0, 11.0, 801)
+    x = np.linspace(-9.0, 11.0, 401)
     T, start = np.asarray(model.transitions(0))[0], np.asarray(model.chains[0].start)
     kernel = np.exp(-((x[:, None] - x) ** 2) / (2 * 0.5))
     kernel /= kernel.sum(0)
@@ -205,7 +205,7 @@ def decay(mean):
     [
         ([lb.Uniform(-2.0, 2.0)], [flat(-2, 2)], SURE, False),
         ([lb.Exponential(1.0)], [decay(1.0)], SURE, False),
-        (SIGHTS, [bell(0.5), flat(0, 6)], FRESH, False),
+        pytest.param(SIGHTS, [bell(0.5), flat(0, 6)], FRESH, False, marks=pytest.mark.slow),
         (SIGHTS, [bell(0.5), flat(0, 6)], STICKY, True),
     ],
     ids=["uniform", "exponential", "sight drawn anew", "told sight"],

@@ -77,18 +77,18 @@ def test_particles_agree_with_a_grid_on_one_signal_strength():
     noise, bias = cut(1.6), cut(3.0)
     one = model(rss(noise=noise, bias=bias, samples=4), times=lb.Times.uniform(step_s=1.0, steps=1))
     z = measure(one.sensors, np.full((32, 1), 18.0), seed=3)
-    got = DistanceParticles(4_000)(one, z, 0)
-    x = np.linspace(5.0, 45.0, 16_001)
+    got = DistanceParticles(PARTICLES)(one, z, 0)
+    x = np.linspace(5.0, 45.0, 4_001)
     prior = np.exp(-((x - 20.0) ** 2) / 2 / (4.0 + 0.25 + 0.25 * 0.5625 + 1 / 36))
     values = double_precision(lambda e: (noise + bias).log_prob(jnp.asarray(e)))
-    for run in range(32):
+    for run in range(8):
         e = z[0][run, 0][:, None] + 25 * np.log10(x)
         p = prior * np.exp(np.asarray(values(e)).sum(0))
         p /= p.sum()
         mean = p @ x
         std = np.sqrt(p @ (x - mean) ** 2)
-        assert abs(got.mean[run, 1, 0] - mean) < 5 * std / np.sqrt(4_000 * 0.3)
-        assert got.covariance[run, 1, 0, 0] == pytest.approx(std**2, rel=0.1)
+        assert abs(got.mean[run, 1, 0] - mean) < 5 * std / np.sqrt(PARTICLES * 0.3)
+        assert got.covariance[run, 1, 0, 0] == pytest.approx(std**2, rel=0.2)
 
 
 def test_steps_without_a_particle_in_the_support_are_counted_and_recovered():
@@ -101,6 +101,7 @@ def test_steps_without_a_particle_in_the_support_are_counted_and_recovered():
     assert np.all(result.diagnostics["error_m"][:, 1] < 2.0)
 
 
+@pytest.mark.slow
 def test_particles_see_a_common_bias_through_the_mean_of_the_samples():
     shared = model(toa(common=True))
     law = Epoch(lb.Gaussian(0.0, 3.5), lb.Uniform(0.0, 3.0), 10, common=True).as_noise()

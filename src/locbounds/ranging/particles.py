@@ -129,7 +129,7 @@ def _looked_up(
 def _systematic(w: Float[Array, "particles runs"], u: Float[Array, " runs"]) -> Int[Array, "particles runs"]:
     """Which particle each of the new ones copies, as :func:`locbounds.filters.resampling.systematic`; one pass.
 
-    >>> _systematic(jnp.array([[0.1], [0.6], [0.3], [0.0]]), jnp.array([0.5]))[:, 0].tolist()
+    >>> jax.jit(_systematic)(jnp.array([[0.1], [0.6], [0.3], [0.0]]), jnp.array([0.5]))[:, 0].tolist()
     [1, 1, 1, 2]
     """
     N, runs = w.shape
