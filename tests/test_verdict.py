@@ -59,6 +59,8 @@ def test_the_table_of_bounds_is_complete():
     assert found(METHODS["survey"].function) is lb.survey_bound
     assert [m.id for m in bounds_of("survey")] == ["survey"]
     assert {m.id for m in METHODS.values() if m.subject == "plan"} == set(OF_PLANS)
+    assert found(METHODS["wwb-recursive"].function) is lb.wwb_recursive
+    assert [m.id for m in bounds_of("model")] == ["wwb-recursive"]
     for id, function in (BOUNDS | OF_PLANS).items():
         assert found(METHODS[id].function) is function
 

@@ -1,5 +1,5 @@
 # The public names: what type checkers see, and what is imported on first use (lazy-loader reads this file).
-from . import papers, testing
+from . import papers, ranging, testing
 from .bounds import (
     AlongTrack,
     Gaussians,
@@ -10,10 +10,22 @@ from .bounds import (
     enumer,
     known_sight,
     los_only,
+    wwb_recursive,
 )
 from .errors import InputError, LocboundsError, PrecisionError, RefusedError
 from .evaluation import evaluate, quantile
-from .filters import EkfBanks, Estimates, FactorisedImmEkf, ImmEkf, ImmKf, ImmKfSmoother, OracleEkf, Rbpf
+from .filters import (
+    EkfBanks,
+    Estimates,
+    FactorisedImmEkf,
+    ImmEkf,
+    ImmKf,
+    ImmKfSmoother,
+    OracleEkf,
+    Predicted,
+    Rbpf,
+    Smoothed,
+)
 from .fit.scenario import fit_scenario
 from .io.footprints import read_city
 from .io.link_table import read_links
@@ -135,6 +147,7 @@ __all__ = [
     "PathLoss",
     "Plan",
     "PrecisionError",
+    "Predicted",
     "Prior",
     "PriorMixture",
     "Prism",
@@ -147,6 +160,7 @@ __all__ = [
     "Scenario",
     "Score",
     "Singularity",
+    "Smoothed",
     "StreetCell",
     "StreetRanges",
     "StudentT",
@@ -189,6 +203,7 @@ __all__ = [
     "papers",
     "plot",
     "quantile",
+    "ranging",
     "raster_ezzb",
     "raster_mmse",
     "raster_wwb",
@@ -216,4 +231,5 @@ __all__ = [
     "toa",
     "uniform_on",
     "wwb",
+    "wwb_recursive",
 ]

@@ -7,6 +7,7 @@ import numpy as np
 from locbounds.errors import InputError
 from locbounds.linalg import is_positive_semidefinite
 from locbounds.measurement import BySight, Range
+from locbounds.model.linear import no_linear_channel, no_linear_motion
 from locbounds.motion import SwitchingMotion
 from locbounds.precision import double_precision, traced
 from locbounds.scenario import Scenario
@@ -83,3 +84,7 @@ MARKOV_CHAINS = Assumption("the sight of every link is a Markov chain of its own
 GAUSSIAN_MOTION = Assumption("the motion is linear with Gaussian noise, Q positive semidefinite", no_gaussian_motion)
 FINITE_GEOMETRY = Assumption("no measurement is infinitely steep at its anchor", infinite_information)
 COMMON = (GAUSSIAN_MOTION, MARKOV_CHAINS, FINITE_GEOMETRY)
+LINEAR_MOTION = Assumption("motion and prior are linear Gaussian without modes", no_linear_motion)
+LINEAR_CHANNELS = Assumption(
+    "what is measured is linear in the state, plus noise that may depend on modes", no_linear_channel
+)

@@ -6,7 +6,7 @@ Docs tables, ``locbounds explain``, verdicts and the command line's choices are 
 import importlib
 from typing import Any, NamedTuple
 
-from locbounds.assumptions import COMMON
+from locbounds.assumptions import COMMON, LINEAR_CHANNELS, LINEAR_MOTION
 from locbounds.errors import InputError
 from locbounds.plan import Plan
 from locbounds.plan_assumptions import BAYESIAN_PLAN, ONE_UNIT, WITH_PRIOR
@@ -56,7 +56,7 @@ class Method(NamedTuple):
     conditions
         Under which condition it is valid at all.
     subject
-        What it speaks of: a ``"scenario"``, a ``"survey"`` or a ``"plan"``.
+        What it speaks of: a ``"scenario"``, a ``"survey"``, a ``"plan"`` or a ``"model"`` built in Python.
     on_plan
         Predicates on a plan, for a bound of scenarios that exists for plans too.
     """
@@ -105,7 +105,8 @@ METHODS: dict[str, Method] = {
             "locbounds.bounds.bcrb:bcrb",
             ("Gaussian prior and motion", "smooth noise"),
             "Not a bound for filters that are told the sight, nor for the error along one fixed track; optimistic when "
-            "real errors are correlated in time beyond the chain.",
+            "real errors are correlated in time beyond the chain. Chains that links share and motion that switches take "
+            "a JumpMarkov model.",
             ("fritsche2013", "louis1982"),
             (*COMMON, SMOOTH_NOISE),
             on_plan=BAYESIAN_PLAN,
@@ -226,6 +227,20 @@ METHODS: dict[str, Method] = {
             ("mcguire2009", "torrieri1984", "qi2002"),
             (DETERMINED, REGULAR_PLAN),
             subject="plan",
+        ),
+        Method(
+            "wwb-recursive",
+            "Recursive WWB",
+            "bound",
+            "Weiss-Weinstein bound of a state that moves, for noises without a Fisher information too.",
+            RANGES,
+            "locbounds.bounds.weinstein:wwb_recursive",
+            ("any noise",),
+            "Loose for noises with hard edges, by some per cent to a third in the root; where modes remember, it is "
+            "that of estimators that are told them.",
+            ("weiss1985", "rapoport2004"),
+            (LINEAR_MOTION, LINEAR_CHANNELS),
+            subject="model",
         ),
         Method(
             "imm-ekf",

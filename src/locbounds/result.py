@@ -159,8 +159,10 @@ class Result(eqx.Module):
             raise RefusedError(
                 f"{self.name} sees {', '.join(sorted(self.sees - bound.sees))}, which {bound.name} assumes to be "
                 "unknown: the filter may be better than this bound",
-                "Compare a smoother, which uses ranges after the step, with other smoothers only"
-                if "future-ranges" in self.sees
+                "Compare a smoother, which uses ranges after the step, with a smoothing bound: horizon='smooth'"
+                if "future-ranges" in self.sees - bound.sees
+                else "Compare it with a bound for the same horizon"
+                if any("steps-old" in what for what in self.sees | bound.sees)
                 else "Use a bound that assumes at least as much, for example enumer for a filter told the sight",
             )
         if self.track and self.track == bound.track:
@@ -250,16 +252,21 @@ def format_with_error(value: Any, error: float, unit: str = "m") -> str:
     return f"{float(value):.{digits}f} +- {error:.{digits}f} {unit}"
 
 
-def tightest(bounds: "list[Result] | tuple[Result, ...]") -> list[Result]:
-    """The largest of the valid bounds that hold for estimators which see the ranges only, compared by average RMSE.
+def tightest(
+    bounds: "list[Result] | tuple[Result, ...]", *, sees: frozenset[str] = frozenset({"ranges"})
+) -> list[Result]:
+    """The largest of the valid bounds that hold for estimators which see this only, compared by average RMSE.
 
     Bounds within four standard errors of the largest are returned with it: none of them is tighter than the other
-    as far as the draws can tell. Refused bounds and numbers conditional on a track are left out.
+    as far as the draws can tell. Refused bounds, numbers conditional on a track and bounds that speak of estimators
+    which see less are left out.
 
     Parameters
     ----------
     bounds
         Results of bounds for one scenario.
+    sees
+        What the estimators see, by default ranges up to the present step.
 
     Returns
     -------
@@ -273,7 +280,7 @@ def tightest(bounds: "list[Result] | tuple[Result, ...]") -> list[Result]:
     >>> [b.id for b in tightest([lb.bcrb(scenario), lb.enumer(scenario), lb.los_only(scenario)])]
     ['bcrb']
     """
-    valid = [b for b in bounds if b.kind == "bound" and b.verdict.status is Status.VALID]
+    valid = [b for b in bounds if b.kind == "bound" and b.verdict.status is Status.VALID and sees <= b.sees]
     if not valid:
         return []
     valid.sort(key=lambda b: -float(b.mean_position_rmse()))

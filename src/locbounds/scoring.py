@@ -15,7 +15,7 @@ from locbounds.simulation import Draws
 
 UNITS = {"millimetres": 1e3, "centimetres": 1e2, "feet": 1 / 0.3048, "kilometres": 1e-3}
 CLOSER = 0.2  # another unit is meant if the median error shrinks to less than this share with it
-SEEN = ("ranges", "sight")
+SEEN = ("ranges", "sight", "future-ranges")
 
 
 class Score(NamedTuple):
@@ -107,7 +107,10 @@ def score(
     """
     seen = frozenset(sees)
     if isinstance(sees, str) or not seen <= frozenset(SEEN) or "ranges" not in seen:
-        raise InputError(f"the filter sees {sees!r}", 'Give ("ranges",) or ("ranges", "sight")')
+        raise InputError(
+            f"the filter sees {sees!r}",
+            'Give ("ranges",), and "sight" or "future-ranges" with it if the filter sees these',
+        )
     if not isinstance(bound, Result):
         raise InputError(f"the bound is {type(bound).__name__}", "Give the result of a bound, such as bcrb(scenario)")
     steps = len(bound.time_s) - 1

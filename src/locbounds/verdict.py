@@ -81,7 +81,7 @@ def judge(
     violations = tuple(reason for a in assumptions if (reason := a.violated(subject)) is not None)
     if violations:
         return Verdict(Status.REFUSED, violations)
-    warnings = dangers(subject) if isinstance(subject, Scenario) else subject.dangers()
+    warnings = dangers(subject) if isinstance(subject, Scenario) else getattr(subject, "dangers", tuple)()
     doubts = tuple(doubt for a in assumptions if (doubt := a.doubtful(subject)) is not None)
     if doubts:
         return Verdict(Status.UNDECIDED, doubts + conditions, warnings)

@@ -35,6 +35,8 @@ def files(folder):
         (["track", "s.toml", "--filters", "none", "--rtol", "nan"], ["rtol is nan"]),
         (["track", "s.toml", "--runs", "0"], ["--runs", "--help"]),
         (["track", "s.toml", "--filters", "none", "--bounds", "known-sight"], ["is random", "enumer"]),
+        (["track", "s.toml", "--horizon", "predict:4"], ["4 steps ahead, the record has 3", "predict:3"]),
+        (["track", "s.toml", "--horizon", "later"], ["the horizon is 'later'", "smooth"]),
         (["track", "none.toml"], ["cannot read none.toml", "locbounds new none.toml"]),
         (
             ["track", "s.toml", "--filters", "none", "--ranges", "r.csv"],
@@ -100,3 +102,11 @@ def test_ctrl_c_in_a_study_does_not_wait_for_the_bounds_that_run(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         next(fritsche2013.study(samples=1, runs=2))
     assert ended.wait(5)
+
+
+def test_bounds_and_filters_follow_the_horizon(tmp_path):
+    done = run("track", "s.toml", "--horizon", "smooth", "--bounds", "enumer", "--filters", "imm-kf-smoother",
+               "--runs", "8", "--rtol", "0.1")  # fmt: skip
+    assert done.exit_code == 0, done.output
+    assert "tightest valid bound for a smoother that sees the ranges only: enumer" in done.output
+    assert "Position RMSE, smoothing" in done.output

@@ -6,6 +6,7 @@ from locbounds.bounds.conditional import enumer, los_only
 from locbounds.bounds.corrected import bcrb_block_tridiagonal
 from locbounds.bounds.expectation import AlongTrack, Expectation, Prior
 from locbounds.bounds.gaussians import Gaussians
+from locbounds.bounds.weinstein import wwb_recursive
 
 __all__ = [
     "AlongTrack",
@@ -18,4 +19,5 @@ __all__ = [
     "enumer",
     "known_sight",
     "los_only",
+    "wwb_recursive",
 ]

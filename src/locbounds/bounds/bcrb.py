@@ -1,5 +1,6 @@
 """Bayesian Cramér-Rao bounds of jump-Markov and known-sight models, with noise and geometry separated."""
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -8,17 +9,18 @@ import numpy as np
 
 from locbounds.axes import Array, Float
 from locbounds.blocks import GROUPS, check_seed
+from locbounds.bounds.backward import bound_recursion
 from locbounds.bounds.bcrb_of_plan import bcrb_of_plan
-from locbounds.bounds.common import bound_result, prepare
+from locbounds.bounds.common import bound_result, further_information, prepare
 from locbounds.bounds.corrected import corrected
 from locbounds.bounds.expectation import Expectation
 from locbounds.bounds.general import general, model_verdict
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
-from locbounds.bounds.recursion import covariance_recursion
 from locbounds.bounds.score_covariance import NoiseProcess, noise_process, score_covariance_increments
 from locbounds.bounds.separated import SeparatedIncrements, geometry
 from locbounds.bounds.truncation import extrapolated, shortened
 from locbounds.errors import InputError, RefusedError
+from locbounds.horizon import Horizon
 from locbounds.model import JumpMarkov, jump_markov
 from locbounds.plan import Plan
 from locbounds.precision import double_precision, traced
@@ -56,8 +58,8 @@ class _Solution(NamedTuple):
     shorter: Float[Array, "2 times"]
 
 
-@jax.jit
-def _solve(scenario, C, G) -> _Solution:
+@partial(jax.jit, static_argnames="horizon")
+def _solve(scenario, C, G, extra, *, horizon) -> _Solution:
     """The bound from the means of all groups, and how its position mean square error changes to first order.
 
     That is, with each group's own tables in place of the means (delta method), and with windows that are shorter by a
@@ -68,7 +70,7 @@ def _solve(scenario, C, G) -> _Solution:
     cuts = [kept[:, None] & kept for kept in shortened(C.shape[-1])]
     every_C = jnp.concatenate([C, mean[0] * np.stack(cuts)[:, None, None]])
     every_G = G if len(G) == 1 else jnp.concatenate([G, mean[1][None], mean[1][None]])
-    P, changes = covariance_recursion(scenario, SeparatedIncrements(*mean, (every_C, every_G)))
+    P, changes = bound_recursion(scenario, SeparatedIncrements(*mean, (every_C, every_G)), horizon, extra)
     return _Solution(Estimate(P, P[:, index, index].sum(-1), changes[:-2]), changes[-2:])
 
 
@@ -82,6 +84,8 @@ def bcrb(
     expectation: Expectation | None = None,
     window: int | None = None,
     engine: str | None = None,
+    horizon: str | Horizon = "filter",
+    extra: Float[Array, "times state state"] | None = None,
     progress: Progress | None = None,
 ) -> Result:
     r"""Bayesian Cramér-Rao bound of a jump-Markov model, at every step; or of a plan, one number.
@@ -116,6 +120,13 @@ def bcrb(
         number is that of the truncated information. The corrected engine (:mod:`locbounds.bounds.corrected`) keeps
         none and takes all lags, whatever the window. By default the windowed one, and the corrected one where tables
         or draws of all steps would take more than a gigabyte.
+    horizon
+        Which measurements an estimator of x_k sees: ``"filter"`` z_1..z_k, ``"predict:N"`` z_1..z_{k-N} (the prior
+        alone for k < N), ``"smooth"`` z_1..z_K. See docs/theory/recursions.md.
+    extra
+        Information about the state at steps 0..K from further measurements, independent of all others given the
+        state: ``H' R^-1 H`` for ``H x + noise`` of covariance R, zero at steps without. A bound with it holds for
+        estimators that see these too.
     progress
         Called with (samples, precision reached, target) after every look.
 
@@ -123,19 +134,19 @@ def bcrb(
     -------
     Result
         ``covariance`` [steps+1, state, state] is the bound on the mean square error matrix of any estimator of x_k
-        from z_1..z_k. ``diagnostics["truncation"]`` is the relative error of the position RMSE, at the worst step,
-        made by truncating at the window, as extrapolated from how the bound changes when the window is shortened by a
-        quarter and by a half. It exceeds the error where the entries left out decay quickly; it is no guarantee, and
-        the error may have either sign. NaN where the window was given. From the corrected engine it is the distance
-        between the truncated and the corrected value, and ``diagnostics["remainder"]``, its square, the order of what
-        the corrected value, which lies below the bound up to its standard error, still lacks.
+        that sees what the horizon says. ``diagnostics["truncation"]`` is the relative error of the position RMSE, at
+        the worst step, made by truncating at the window, as extrapolated from how the bound changes when the window is
+        shortened by a quarter and by a half. It exceeds the error where the entries left out decay quickly; it is no
+        guarantee, and the error may have either sign. NaN where the window was given. From the corrected engine it is
+        the distance between the truncated and the corrected value, and ``diagnostics["remainder"]``, its square, the
+        order of what the corrected value, which lies below the bound up to its standard error, still lacks.
 
     Raises
     ------
     RefusedError
-        If an assumption is violated (see ``locbounds explain bcrb``).
+        If an assumption is violated (see ``locbounds explain bcrb``), or the engine has no such horizon.
     InputError
-        If an option makes no sense.
+        If an option makes no sense, or the horizon lies beyond the record.
 
     Notes
     -----
@@ -154,16 +165,23 @@ def bcrb(
     """
     if isinstance(scenario, Plan):
         return bcrb_of_plan(scenario, rtol=1e-3 if rtol is None else rtol)
+    horizon = Horizon.parse(horizon, scenario.steps)
+    extra = further_information(scenario, extra)
     if isinstance(scenario, JumpMarkov) or beyond_separation(scenario):
         if engine is not None:
             raise InputError(f"engine {engine!r} does not take this model", "Leave the engine out")
-        return _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress)
+        return _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress, horizon, extra)
     if engine not in (None, "windowed", "corrected"):
         raise InputError(f"the engine is {engine!r}", "Give 'windowed' or 'corrected', or leave it out")
     why = "it was asked for" if engine else too_large(scenario, window)
     if engine == "corrected" or (engine is None and why is not None and not traced(scenario, expectation)):
+        if horizon.kind != "filter" or extra is not None:
+            raise RefusedError(
+                f"the corrected engine, taken because {why}, gives filtering bounds from the scenario's ranges alone",
+                "Use engine='windowed', which needs memory for the tables of all steps",
+            )
         return corrected(scenario, rtol, samples, seed, expectation, window, progress, str(why))
-    return separated("bcrb", scenario, rtol, samples, seed, expectation, window, progress)
+    return separated("bcrb", scenario, rtol, samples, seed, expectation, window, progress, horizon, extra)
 
 
 def too_large(scenario: Scenario, window: int | None) -> str | None:
@@ -184,7 +202,7 @@ def too_large(scenario: Scenario, window: int | None) -> str | None:
     return f"tables of {scenario.steps:,} steps and {links} different noises would take {(tables + draws) / 1e9:.1f} GB"
 
 
-def _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress) -> Result:
+def _by_general_engine(scenario, rtol, samples, seed, expectation, window, progress, horizon, extra) -> Result:
     if traced(scenario, expectation):
         raise InputError(
             "the general engine cannot be transformed by JAX",
@@ -197,7 +215,7 @@ def _by_general_engine(scenario, rtol, samples, seed, expectation, window, progr
     else:
         _, verdict = prepare("bcrb", scenario, None)
         model, why = jump_markov(scenario.anonymous()), str(beyond_separation(scenario))
-    return general("bcrb", model, why, rtol, samples, seed, expectation, window, progress, verdict)
+    return general("bcrb", model, why, rtol, samples, seed, expectation, window, progress, verdict, horizon, extra)
 
 
 @double_precision
@@ -208,13 +226,15 @@ def known_sight(
     samples: int | None = None,
     seed: int = 0,
     expectation: Expectation | None = None,
+    horizon: str | Horizon = "filter",
+    extra: Float[Array, "times state state"] | None = None,
     progress: Progress | None = None,
 ) -> Result:
     """Posterior Cramér-Rao bound for a known sight schedule.
 
     Parameters
     ----------
-    scenario, rtol, samples, seed, expectation, progress
+    scenario, rtol, samples, seed, expectation, horizon, extra, progress
         As for :func:`bcrb`; every link's sight is a :class:`~locbounds.KnownSight`. With
         ``AlongTrack(positions)`` nothing is random and the number is conditional on the track.
 
@@ -241,10 +261,11 @@ def known_sight(
     >>> bool(lb.known_sight(scenario).mean_position_rmse() < 45)
     True
     """
-    return separated("known-sight", scenario, rtol, samples, seed, expectation, 1, progress)
+    horizon, extra = Horizon.parse(horizon, scenario.steps), further_information(scenario, extra)
+    return separated("known-sight", scenario, rtol, samples, seed, expectation, 1, progress, horizon, extra)
 
 
-def separated(id, scenario, rtol, samples, seed, expectation, window, progress) -> Result:
+def separated(id, scenario, rtol, samples, seed, expectation, window, progress, horizon, extra) -> Result:
     """The engine: blocks of score covariances and geometries until window and precision suffice."""
     expectation, verdict = prepare(id, scenario, expectation)
     scenario = scenario.anonymous()
@@ -275,7 +296,7 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
             return jnp.stack(C, axis=1), G
 
         tables = draw(0)
-        solution = _solve(scenario, *tables)
+        solution = _solve(scenario, *tables, extra, horizon=horizon)
         truncation = 0.0 if size == scenario.steps or id == "known-sight" else np.nan  # known sight: nothing to cut
         if window is None and size < scenario.steps and not differentiable:
             truncation = extrapolated(solution.shorter, solution.estimate.position_mse, size, scenario.steps)
@@ -284,7 +305,7 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
                 continue
         estimate, done = refine(
             draw,
-            lambda tables: _solve(scenario, *tables).estimate,
+            lambda tables: _solve(scenario, *tables, extra, horizon=horizon).estimate,
             rtol=rtol_target,
             blocks=blocks,
             samples_per_block=groups * PATHS,
@@ -294,4 +315,5 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress) 
         break
     how = f"noise and geometry separated, Louis' identity, window of {size} steps"
     diagnostics = {"truncation": np.float64(truncation), "window": np.int64(size)}
-    return bound_result(id, scenario, estimate, verdict, expectation, seed, done * groups * PATHS, how, diagnostics)
+    used = done * groups * PATHS
+    return bound_result(id, scenario, estimate, verdict, expectation, seed, used, how, diagnostics, horizon)

@@ -99,7 +99,11 @@ class GivenIncrements(Increments):
 
 
 def covariance_recursion(
-    scenario: Scenario | LinearModel, increments: Increments
+    scenario: Scenario | LinearModel,
+    increments: Increments,
+    *,
+    extra: Float[Array, "times state state"] | None = None,
+    rows: Float[Array, "steps space state"] | None = None,
 ) -> tuple[Float[Array, "times state state"], Float[Array, "groups times"]]:
     """Bound on the mean square error matrix at steps 0..K, and first-order changes of its position part.
 
@@ -109,6 +113,10 @@ def covariance_recursion(
         Motion and prior are taken from it; or these alone.
     increments
         The information that the steps add.
+    extra
+        Information about the state at steps 0..K from further independent measurements.
+    rows
+        Matrices R_k whose ``tr R_k P_k R_k'`` the changes are of, at steps 1..K; by default those of the position.
 
     Returns
     -------
@@ -127,23 +135,29 @@ def covariance_recursion(
     model = linear_model(scenario)
     n, groups = len(model.P0), increments.groups
     window = Window(model, increments.ages)
-    index = np.array(model.position)
+    if rows is None:
+        rows = jnp.broadcast_to(jnp.eye(n)[np.array(model.position)], (len(model.F), len(model.position), n))
 
     def step(carry, inputs):
         S, dS, carried = carry
-        F, Q, piece = inputs
+        F, Q, X, R, piece = inputs
         carried, D, dD = increments.advance(carried, piece)
         S = window.update(window.predict(S, F, Q), D)
         if dD is not None:
             L = S[:, window.observed]
             M = (jnp.eye(window.size).at[:, window.observed].add(-L @ D)) @ window.shift(F)
             dS = congruence(M, dS) - congruence(L, dD)
-        return (S, dS, carried), (S[:n, :n], dS[index, :, index].sum(0))
+        if X is not None:
+            S = window.update(S, X, window.state)
+            M = jnp.eye(window.size).at[:, window.state].add(-S[:, window.state] @ X)
+            dS = congruence(M, dS)
+        return (S, dS, carried), (S[:n, :n], jnp.einsum("ai,igj,aj->g", R, dS[:n, :, :n], R))
 
-    first = window.first(), jnp.zeros((window.size, groups, window.size)), increments.first()
-    inputs = model.F, model.Q, increments.pieces
+    S = window.first() if extra is None else window.update(window.first(), extra[0], window.state)
+    first = S, jnp.zeros((window.size, groups, window.size)), increments.first()
+    inputs = model.F, model.Q, None if extra is None else extra[1:], rows, increments.pieces
     _, (later, changes) = jax.lax.scan(step, first, inputs)
-    P = jnp.concatenate([jnp.asarray(model.P0)[None], later])
+    P = jnp.concatenate([S[:n, :n][None], later])
     return P, jnp.concatenate([jnp.zeros((groups, 1)), changes.T], axis=1)
 
 
@@ -163,6 +177,7 @@ class Window:
         self.n, self.size = n, n + d * (ages - 1)
         self.prior = model.P0
         self.observed = np.concatenate([position, np.arange(n, self.size)])
+        self.state = np.arange(n)
         self.age = np.zeros((self.size, self.size))  # ages move on by one; age 1 is taken from the state
         if ages > 1:
             self.age[n + np.arange(d), position] = 1.0
@@ -179,7 +194,12 @@ class Window:
         T = self.shift(F)
         return jnp.asarray(T @ S @ T.T).at[: self.n, : self.n].add(Q)
 
-    def update(self, S: Array, D: Array) -> Float[Array, "size size"]:
-        cross = S[:, self.observed]
-        gain = jnp.linalg.solve(jnp.eye(len(self.observed)) + D @ cross[self.observed], D @ cross.T)
-        return symmetrize(S - cross @ gain)
+    def update(self, S: Array, D: Array, about: np.ndarray | None = None) -> Float[Array, "size size"]:
+        """Covariance with the information D added, by default about the observed components."""
+        cross = S[:, self.observed if about is None else about]
+        return symmetrize(S - cross @ self.gain(S, D, about) @ cross.T)
+
+    def gain(self, S: Array, D: Array, about: np.ndarray | None = None) -> Array:
+        """``(I + D S_pp)^-1 D``: symmetric."""
+        about = self.observed if about is None else about
+        return jnp.linalg.solve(jnp.eye(len(about)) + D @ S[about][:, about], D)

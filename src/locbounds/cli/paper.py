@@ -20,14 +20,16 @@ from locbounds.cli.paper_names import paper as find_paper
 
 def paper(
     name: Annotated[
-        str, typer.Argument(metavar="PAPER", help="chen2010, fritsche2013 or mcguire2009", show_default=False)
+        str,
+        typer.Argument(metavar="PAPER", help="chen2010, fritsche2013, mcguire2009 or prieto2011", show_default=False),
     ],
     samples: Annotated[
         int | None,
         typer.Option(
             "--samples",
             min=1,
-            help="Draws of every bound, in blocks of 2048; by default until the s.e. is below 0.1 %.",
+            help="Draws of every bound, in blocks of 2048; by default until the s.e. is below 0.1 %. For prieto2011 "
+            "those of the information as printed, by default 10,000.",
         ),
     ] = None,
     runs: Annotated[
@@ -35,13 +37,16 @@ def paper(
         typer.Option(
             "--runs",
             min=2,
-            help="Tracks for every filter; by default 10,000 (the paper: 20,000), for chen2010 400 (the paper: 50).",
+            help="Tracks for every filter; by default 10,000 (the paper: 20,000), for chen2010 400 (the paper: 50), "
+            "for prieto2011 128.",
         ),
     ] = None,
     requirement: RequirementOption = "e911",
     data: Annotated[
         Path | None,
-        typer.Option("--data", metavar="DIR", help="Measured surveys of mcguire2009; by default $LOCBOUNDS_DATA."),
+        typer.Option(
+            "--data", metavar="DIR", help="Measured data of mcguire2009 and prieto2011; by default $LOCBOUNDS_DATA."
+        ),
     ] = None,
     figures: Annotated[
         str | None, typer.Option("--figures", metavar="NAMES", help="Of mcguire2009, e.g. fig3,fig6; by default all.")
@@ -56,8 +61,9 @@ def paper(
     fritsche2013 writes table1.csv, fig1.csv and fig1.png; after Ctrl-C the finished columns of Table I in
     partial-table1.csv. The table on the screen compares every published entry with the computed one. chen2010 writes
     fig1 and fig2 (csv, png), quantiles.csv, segments.csv, settings.csv, bounds.csv and requirement.csv, and says which
-    statements of the paper hold. mcguire2009 writes fig3 to fig6 and fig8 (csv, png), fig7.png
-    and, given the measured surveys, fig9 (csv, png).
+    statements of the paper hold. mcguire2009 writes fig3 to fig6 and fig8 (csv, png), fig7.png and, given the measured
+    surveys, fig9 (csv, png). prieto2011 writes fig1, fig2 and fig3 (csv, png), as-printed.csv, settings.csv and, where
+    the data are there, measured.csv.
 
     [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
     """
@@ -68,6 +74,10 @@ def paper(
             from locbounds.cli.paper_chen2010 import chen2010
 
             chen2010(folder, runs=runs, seed=seed, wanted=wanted, json=json)
+        elif name == "prieto2011":
+            from locbounds.cli.paper_prieto2011 import prieto2011
+
+            prieto2011(folder, samples=samples, runs=runs, data=data, seed=seed, json=json)
         elif name == "fritsche2013":
             _fritsche2013(folder, samples, 10_000 if runs is None else runs, seed, json)
         else:

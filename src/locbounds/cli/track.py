@@ -31,6 +31,7 @@ from locbounds.cli.output import count_progress, output_folder, precision_progre
 from locbounds.errors import InputError
 
 if TYPE_CHECKING:
+    from locbounds.horizon import Horizon
     from locbounds.registry import Method
     from locbounds.result import Result
     from locbounds.scenario import Scenario
@@ -52,6 +53,14 @@ def track(
         float | None, typer.Option("--rtol", help="Relative standard error to reach at every step; default 1e-3.")
     ] = None,
     runs: Annotated[int, typer.Option("--runs", min=2, help="Simulated tracks for every filter.")] = 1_000,
+    horizon: Annotated[
+        str,
+        typer.Option(
+            "--horizon",
+            metavar="filter|predict:N|smooth",
+            help="Ranges that an estimate of a step may use: up to it, up to N steps before, or all of the record.",
+        ),
+    ] = "filter",
     requirement: RequirementOption = "e911",
     seed: SeedOption = 0,
     ranges: RangesOption = None,
@@ -73,22 +82,27 @@ def track(
     the measured ranges instead of simulated ones and the bound is computed along the measured tracks. After Ctrl-C
     what was finished is in partial-rmse.csv, partial-run.nc and partial-rmse.png.
 
+    With --horizon predict:N the filters' estimates are moved on N steps; with --horizon smooth a pass backwards
+    follows them, and the bounds are those of smoothers.
+
     [bold]Example[/bold]: locbounds track scenario.toml --bounds bcrb,enumer --filters imm-ekf --rtol 1e-3
     """
+    from locbounds.horizon import Horizon
     from locbounds.io.scenario_file import load
 
     wanted = requirements(requirement)
     model = load(scenario)
+    reach = Horizon.parse(horizon, None if ranges is not None else model.steps)
     chosen_bounds = applicable_bounds(model, bounds)
-    chosen_filters = _filters(model, filters)
+    chosen_filters = _filters(model, filters, reach)
     if not chosen_bounds and not chosen_filters:
         raise InputError("neither a bound nor a filter was asked for", "Name at least one with --bounds or --filters")
     with output_folder(default_out(scenario, out), force=force) as folder:
         if ranges is not None or anchors is not None or truth is not None:
             log = read(ranges, anchors, truth, select, time_offset, merge, every, columns, None)
-            _along_log(model, log, hold_out, chosen_bounds, chosen_filters, rtol, seed, folder, json, wanted)
+            _along_log(model, log, hold_out, chosen_bounds, chosen_filters, rtol, seed, folder, json, wanted, reach)
         else:
-            _on_model(model, chosen_bounds, chosen_filters, rtol, runs, seed, folder, json, wanted)
+            _on_model(model, chosen_bounds, chosen_filters, rtol, runs, seed, folder, json, wanted, reach)
 
 
 def applicable_bounds(model: "Scenario", ids: str | None) -> "list[Method]":
@@ -100,24 +114,28 @@ def applicable_bounds(model: "Scenario", ids: str | None) -> "list[Method]":
         chosen = [] if ids == "none" else [method(id.strip(), "bound") for id in ids.split(",")]
         for m in chosen:
             if m.subject != "scenario":
-                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", f"Run locbounds {m.subject}")
+                python = "Call it from Python on a JumpMarkov model"
+                remedy = python if m.subject == "model" else f"Run locbounds {m.subject}"
+                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", remedy)
         return chosen
     applicable = [m for m in bounds_of("scenario") if m.verdict(model).status is not Status.REFUSED]
     known = any(m.id == "known-sight" for m in applicable)  # then nothing is left to average over
     return [m for m in applicable if not (known and m.id in ("bcrb", "enumer"))]
 
 
-def _filters(model: "Scenario", ids: str | None) -> list[Any]:
+def _filters(model: "Scenario", ids: str | None, horizon: "Horizon") -> list[Any]:
     from locbounds import registry
+    from locbounds.filters import with_horizon
 
     if ids is None:
         ids = "imm-ekf" if len(model.links) <= JOINT_ANCHORS else "imm-ekf-factorised"
         if model.motion.state_size == 2 * model.dim:  # imm-kf smooths ranges and range rates
-            ids += ",imm-kf"
-    return [] if ids == "none" else [registry.load(registry.method(id.strip(), "filter"))() for id in ids.split(",")]
+            ids += ",imm-kf-smoother" if horizon.kind == "smooth" else ",imm-kf"
+    chosen = [] if ids == "none" else ids.split(",")
+    return [with_horizon(registry.load(registry.method(id.strip(), "filter"))(), horizon) for id in chosen]
 
 
-def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted) -> None:
+def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted, horizon) -> None:
     from locbounds import registry
     from locbounds.evaluation import evaluate_on, quantile
     from locbounds.result import format_with_error, tightest
@@ -127,7 +145,7 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted) ->
     try:
         for entry in bounds:
             with precision_progress(entry.name) as progress:
-                results.append(registry.load(entry)(model, rtol=rtol, seed=seed, progress=progress))
+                results.append(registry.load(entry)(model, rtol=rtol, seed=seed, progress=progress, **_option(horizon)))
         if filters:
             with status(f"drawing {runs:,} tracks"):
                 draws = simulate(model, runs=runs, seed=seed)
@@ -139,7 +157,8 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted) ->
         _save(results, model, folder)
         raise
     _save(results, model, folder)
-    best = tightest(results)
+    seen = horizon.sees(registry.RANGES)
+    best = tightest(results, sees=seen)
     complied = compliance.of_results(wanted, results)
 
     rows = []
@@ -162,12 +181,13 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted) ->
         print_json([row | more for row, more in zip(rows, extra, strict=True)])
         return
     print_table(
-        f"Position RMSE, mean over steps 0..{model.steps} (± one standard error)",
+        f"Position RMSE{horizon.label}, mean over steps 0..{model.steps} (± one standard error)",
         ["method", "kind", "RMSE", "efficiency [95 %]", "67 % / 95 % in m", "verdict"],
         rows,
     )
     if len(best) == 1:
-        typer.echo(f"tightest valid bound for a filter that sees the ranges only: {best[0].id}")
+        whom = {"predict": "predictor", "smooth": "smoother"}.get(horizon.kind, "filter")
+        typer.echo(f"tightest valid bound for a {whom} that sees the ranges only: {best[0].id}")
     elif best:
         names = " and ".join(b.id for b in best)
         typer.echo(f"tightest valid bounds: {names}, equal within four standard errors")
@@ -175,6 +195,11 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted) ->
     for warning in dict.fromkeys(w for r in results for w in r.verdict.warnings):
         typer.echo(f"warning: {warning}")
     typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")
+
+
+def _option(horizon: "Horizon") -> dict[str, Any]:
+    """What is handed to a bound: nothing where it is the usual one, which every bound has."""
+    return {} if horizon.kind == "filter" else {"horizon": horizon}
 
 
 def _save(results, model, folder) -> None:
@@ -189,7 +214,7 @@ def _save(results, model, folder) -> None:
         folder.write("rmse.png", lambda path: plot.rmse(results, title=title).savefig(path, dpi=150))
 
 
-def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json, wanted) -> None:
+def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json, wanted, horizon) -> None:
     from locbounds import registry
     from locbounds.fit.held_out import EXPLANATION, along_tracks
     from locbounds.report import tables, track_plot
@@ -203,6 +228,7 @@ def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json, 
             log,
             bounds=[registry.load(entry) for entry in bounds],
             filters=filters,
+            horizon=horizon,
             rtol=LOG_RTOL if rtol is None else rtol,
             seed=seed,
             announce=say,
@@ -230,7 +256,8 @@ def _along_log(model, log, hold_out, bounds, filters, rtol, seed, folder, json, 
         tails = f"{r.quantile(0.5):.2f} / {r.quantile(0.95):.2f}" if r.kind == "filter" else ""
         rows.append([r.id, r.kind, f"{value:.3f} m" + (f" ± {error:.3f}" if error > 0 else ""), tails])
     print_table(
-        f"Position RMSE over {len(log.tracks)} measured {noun} after the first step (± one s.e. over tracks)",
+        f"Position RMSE{horizon.label} over {len(log.tracks)} measured {noun} after the first step "
+        "(± one s.e. over tracks)",
         ["method", "kind", "RMSE", "50 % / 95 % in m"],
         rows,
     )

@@ -13,6 +13,7 @@ from locbounds.bounds import AlongTrack
 from locbounds.errors import InputError
 from locbounds.evaluation import estimates, position_error
 from locbounds.fit.range_log import RangeLog, Track
+from locbounds.horizon import Horizon
 from locbounds.measurement import Range
 from locbounds.result import Result
 from locbounds.scenario import Link, Scenario
@@ -117,6 +118,7 @@ def along_tracks(
     *,
     bounds: Sequence[Callable[..., Result]],
     filters: Sequence[Callable[..., Any]],
+    horizon: Horizon | None = None,
     rtol: float | None = None,
     seed: int = 0,
     announce: Callable[[str], None] | None = None,
@@ -131,6 +133,8 @@ def along_tracks(
         Tracks with true positions, none of which should have been used to fit the model.
     bounds, filters : sequences
         For example ``[lb.bcrb]`` and ``[lb.ImmEkf(), lb.ImmKf()]``.
+    horizon
+        Of the bounds; by default that of filters. Smoothing looks at each track by itself, up to its own end.
     rtol, seed
         Handed to the bounds and filters.
     announce
@@ -156,15 +160,19 @@ def along_tracks(
         )
     say = announce or (lambda what: None)
     squares: dict[tuple[str, str, str], list[Any]] = {}
+    horizon = horizon or Horizon()
+    short = min(log.tracks, key=lambda track: track.steps)
+    Horizon.parse(horizon, short.steps)
+    option = {} if horizon.kind == "filter" else {"horizon": horizon}
     longest = max(track.steps for track in log.tracks)
     for track in log.tracks:
         steps = track.steps
-        long = _padded(track, longest)
+        long = track if horizon.kind == "smooth" else _padded(track, longest)
         model = on_track(scenario, long)
         truth = np.asarray(long.position_m)
         for bound in bounds:
             say(f"{track.name}: {getattr(bound, '__name__', bound)}")
-            result = bound(model, rtol=rtol, seed=seed, expectation=AlongTrack(truth, label=LABEL))
+            result = bound(model, rtol=rtol, seed=seed, expectation=AlongTrack(truth, label=LABEL), **option)
             squares.setdefault((result.id, result.name, "bound"), []).append(
                 np.asarray(result.position_mse)[: steps + 1]
             )

@@ -9,16 +9,18 @@ import numpy as np
 
 from locbounds.axes import Array, Float
 from locbounds.blocks import GROUPS, check_seed
+from locbounds.bounds.backward import bound_recursion
 from locbounds.bounds.common import bound_result
 from locbounds.bounds.expectation import Expectation, Prior
 from locbounds.bounds.general.frame import Frame, Tables, beyond_reference, frame, linear_model, placed
 from locbounds.bounds.general.increments import information_increments
 from locbounds.bounds.general.parts import Part
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
-from locbounds.bounds.recursion import GivenIncrements, LinearModel, covariance_recursion
+from locbounds.bounds.recursion import GivenIncrements, LinearModel
 from locbounds.bounds.truncation import extrapolated, shortened
 from locbounds.errors import InputError, RefusedError
-from locbounds.model import AdditiveChannel, JumpMarkov
+from locbounds.horizon import FILTER, PREDICT, Horizon
+from locbounds.model import AdditiveChannel, DensityMotion, JumpMarkov
 from locbounds.paths import draw_paths
 from locbounds.priors import DensityPrior
 from locbounds.result import Result
@@ -62,8 +64,10 @@ def _by_part(model: JumpMarkov, parts: list[Part], z: tuple[Array, ...]) -> list
 
 
 @eqx.filter_jit
-def _recursion(linear: LinearModel, mean: Array, changes: Array) -> tuple[Array, Array]:
-    return covariance_recursion(linear, GivenIncrements(mean, changes))
+def _recursion(
+    linear: LinearModel, mean: Array, changes: Array, extra: Array | None, horizon: Horizon
+) -> tuple[Array, Array]:
+    return bound_recursion(linear, GivenIncrements(mean, changes), horizon, extra)
 
 
 class _Solution(NamedTuple):
@@ -73,7 +77,15 @@ class _Solution(NamedTuple):
     shorter: Float[Array, "2 times"]
 
 
-def _solve(model: JumpMarkov, what: Frame, linear: LinearModel, tables: Tables, window: int) -> _Solution:
+def _solve(
+    model: JumpMarkov,
+    what: Frame,
+    linear: LinearModel,
+    tables: Tables,
+    window: int,
+    horizon: Horizon,
+    extra: Array | None,
+) -> _Solution:
     """The bound from the means of all groups, and each group's change of it (delta method)."""
     beyond = beyond_reference(model, what, linear, tables)
     mean = beyond.mean(0)
@@ -81,11 +93,11 @@ def _solve(model: JumpMarkov, what: Frame, linear: LinearModel, tables: Tables, 
     for kept in shortened(window):
         kept = np.pad(kept, (mean.shape[1] - window, 0), constant_values=True)  # with lag 1 the newest two ages are one
         cuts.append(mean * (kept[:, None, None, None] & kept[:, None]))
-    P, changes = _recursion(linear, mean, jnp.concatenate([beyond, jnp.stack(cuts)]) - mean)
+    P, changes = _recursion(linear, mean, jnp.concatenate([beyond, jnp.stack(cuts)]) - mean, extra, horizon)
     deviations, shorter = changes[:-2], changes[-2:]
     index = np.array(model.position_index)
-    if isinstance(model.prior, DensityPrior):
-        P0 = jnp.linalg.inv(tables.prior.mean(0))
+    if isinstance(model.prior, DensityPrior) and horizon.kind == FILTER:
+        P0 = jnp.linalg.inv(tables.prior.mean(0) + (0.0 if extra is None else extra[0]))
         change = -jnp.einsum("ab,gbc,cd->gad", P0, tables.prior - tables.prior.mean(0), P0)
         P = jnp.asarray(P).at[0].set(P0)
         deviations = jnp.asarray(deviations).at[:, 0].set(change[:, index, index].sum(-1))
@@ -103,9 +115,12 @@ def general(
     window: int | None,
     progress: Progress | None,
     verdict: Verdict,
+    horizon: Horizon,
+    extra: Array | None,
 ) -> Result:
     """The bound of a jump-Markov model by the general engine; arguments as for :func:`locbounds.bcrb`."""
     expectation = Prior() if expectation is None else expectation
+    _check_predictable(model, horizon)
     if not isinstance(expectation, Prior):
         raise InputError(
             f"the general engine ({why}) averages over the model's own tracks, not along {expectation.label}",
@@ -127,7 +142,7 @@ def general(
         first_block = draw(0)
         _check_finite(first_block)
         linear = linear_model(model, what, first_block)
-        solution = _solve(model, what, linear, first_block, size)
+        solution = _solve(model, what, linear, first_block, size, horizon, extra)
         truncation = 0.0 if size == model.steps else np.nan
         if window is None and size < model.steps:
             truncation = extrapolated(solution.shorter, solution.estimate.position_mse, size, model.steps)
@@ -139,7 +154,7 @@ def general(
 
     def evaluate(tables: Tables) -> Estimate:
         last[:] = [tables]
-        return _solve(model, what, linear, tables, size).estimate
+        return _solve(model, what, linear, tables, size, horizon, extra).estimate
 
     estimate, done = refine(
         draw,
@@ -158,7 +173,21 @@ def general(
     }
     how = f"general engine, because {why}; Fisher's and Louis' identities, window of {size} steps"
     verdict = _judged(verdict, model, strange)
-    return bound_result(id, model, estimate, verdict, expectation, seed, done * groups * PATHS, how, diagnostics)
+    used = done * groups * PATHS
+    return bound_result(id, model, estimate, verdict, expectation, seed, used, how, diagnostics, horizon)
+
+
+def _check_predictable(model: JumpMarkov, horizon: Horizon) -> None:
+    """A RefusedError where a filtering bound does not simply move on with the motion."""
+    if horizon.kind != PREDICT:
+        return
+    nonlinear = isinstance(model.motion, DensityMotion)
+    if model.switching or nonlinear or isinstance(model.prior, DensityPrior):
+        what = "switches" if model.switching else "is a density" if nonlinear else "starts from a density"
+        raise RefusedError(
+            f"the motion {what}: a prediction bound does not follow from the filtering bound",
+            "Give the model no reports after some step; the filtering bounds of later steps predict from there",
+        )
 
 
 def _check_finite(tables: Tables) -> None:

@@ -1,0 +1,8 @@
+"""Weiss-Weinstein bounds of states that move, for any noise: they need no Fisher information."""
+
+from locbounds.bounds.weinstein.gram import gram
+from locbounds.bounds.weinstein.model import wwb_recursive
+from locbounds.bounds.weinstein.path import path_bound
+from locbounds.bounds.weinstein.recursion import weiss_weinstein_recursion
+
+__all__ = ["gram", "path_bound", "weiss_weinstein_recursion", "wwb_recursive"]

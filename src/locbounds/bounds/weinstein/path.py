@@ -1,0 +1,133 @@
+r"""Weiss-Weinstein bound with test functions that shift the whole path: any Q, also a singular one, and any horizon.
+
+The states are linear functions of independent standard normal numbers theta = (x_0, noises of the motion, whitened).
+A shift u of theta moves the i-th measured quantity by ``D_i u`` and has
+
+    log eta(u) = -|u|^2 / 8 + log rho(D u),
+
+rho being the Bhattacharyya coefficient of all measurements that an estimator may use. Any shifts u_1, u_2, .. give the
+valid bound ``H G^-1 H'`` for the error of ``X theta``, with columns ``X u_m`` in H. The best directions of a Gaussian
+problem with information i per measurement are the columns of ``V = (I + D' i D)^-1 X'``; they are made orthogonal in
+the covariance ``X V``. Directions for several guesses of i and several lengths of each are taken together and scaled to
+the best common size. With lengths tending to zero the bound of a Gaussian problem is its covariance ``X V``.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from locbounds.axes import Float, ndarray
+from locbounds.bounds.weinstein.gram import LOST, gram
+
+LENGTHS = (1.0, 2.0, 3.0)  # of the test shifts, relative to each other
+SCALES = np.geomspace(0.02, 2.5, 22)  # common scales, in deviations of the Gaussian problem
+LONGEST = 100.0  # deviations: where the search ends
+FINER = 12
+NOTHING = 1e-12  # relative variance of a direction that says nothing new
+
+LogRho = Callable[[Float[ndarray, "rows *n"]], Float[ndarray, "*n"]]
+
+
+def path_bound(
+    D: Float[ndarray, "rows theta"],
+    log_rho: LogRho,
+    information: Float[ndarray, "guesses rows"],
+    X: Float[ndarray, "state theta"],
+    count: int,
+) -> tuple[Float[ndarray, "state state"], float]:
+    """Bound on the mean square error matrix of a linear function of the path.
+
+    Parameters
+    ----------
+    D
+        How theta moves what is measured, one row per measurement.
+    log_rho
+        Logarithm of the coefficient of all measurements, for shifts of what is measured.
+    information
+        Guesses of the information per measurement, which set the directions; none can do harm.
+    X
+        How theta makes the state whose error is bounded.
+    count
+        The scale is that of the bound which is largest in the sum of its first ``count`` diagonal entries.
+
+    Returns
+    -------
+    bound, scale
+        The bound, and the scale of its test shifts in deviations of the Gaussian problem.
+
+    Examples
+    --------
+    One standard normal number, measured with a standard deviation of 1/2: the Bayesian variance is 1/5.
+
+    >>> bound, _ = path_bound(np.ones((1, 1)), lambda u: -(u[0] ** 2) / 2, np.array([[4.0]]), np.ones((1, 1)), 1)
+    >>> bound.round(4)
+    array([[0.2]])
+    """
+    units = []
+    for i in information:
+        V = np.linalg.solve(np.eye(D.shape[1]) + (D.T * i) @ D, X.T)
+        units.append(_orthogonal(V, X @ V))
+    units = np.concatenate(units)
+    if not len(units):
+        return np.zeros((len(X), len(X))), float("nan")
+    bounds_at = _Shifts(D, X, (units[:, None] * np.array(LENGTHS)[:, None]).reshape(-1, D.shape[1]), log_rho)
+    scales, (value, _) = SCALES, bounds_at(SCALES, count)
+    while np.argmax(value) == len(scales) - 1 and scales[-1] < LONGEST:  # the grid is too short
+        scales = np.append(scales, scales[-1] * np.array([1.5, 2.25]))
+        value = np.append(value, bounds_at(scales[-2:], count)[0])
+    at = int(np.argmax(value))
+    near = np.geomspace(scales[max(at - 1, 0)], scales[min(at + 1, len(scales) - 1)], FINER)
+    value, bounds = bounds_at(near, count)
+    at = int(np.argmax(value))
+    return bounds[at], float(near[at])
+
+
+class _Shifts:
+    """Bounds for scaled copies of some shifts of theta."""
+
+    def __init__(self, D: ndarray, X: ndarray, shifts: ndarray, log_rho: LogRho):
+        self.H, self.log_rho = shifts @ X.T, log_rho
+        self.parts = [
+            (np.sum(u**2, -1), np.moveaxis(u @ D.T, -1, 0)[..., None])
+            for u in (shifts[:, None] - shifts, shifts[:, None] + shifts, shifts)
+        ]
+
+    def __call__(self, scales: ndarray, count: int) -> tuple[ndarray, ndarray]:
+        """Sum of the first diagonal entries [scales], and the matrices [scales, state, state]."""
+        logs = [
+            np.moveaxis(-square[..., None] * scales**2 / 8 + self.log_rho(moved * scales), -1, 0)
+            for square, moved in self.parts
+        ]
+        H = scales[:, None, None] * self.H
+        bounds = projected(H, gram(*logs))
+        return np.einsum("...ii->...i", bounds)[:, :count].sum(-1), bounds
+
+
+def projected(H: Float[ndarray, "*n m state"], G: Float[ndarray, "*n m m"]) -> Float[ndarray, "*n state state"]:
+    """``H' G^-1 H``; combinations of test functions that vanish up to rounding are left out, which keeps it valid.
+
+    >>> projected(np.array([[1.0]]), np.array([[2.0]])).round(12)
+    array([[0.5]])
+    """
+    scale = np.sqrt(np.einsum("...ii->...i", G))
+    values, vectors = np.linalg.eigh(G / scale[..., :, None] / scale[..., None, :])
+    kept = values > LOST * values[..., -1:]
+    part = np.swapaxes(vectors, -1, -2) @ (H / scale[..., None])
+    part = part * np.where(kept, 1 / np.sqrt(np.where(kept, values, 1.0)), 0.0)[..., None]
+    return np.swapaxes(part, -1, -2) @ part
+
+
+def _orthogonal(V: ndarray, S: ndarray) -> ndarray:
+    """Combinations of the columns of V, one per row, uncorrelated in S and of variance one."""
+    units: list[ndarray] = []
+    done = np.zeros((0, len(S)))  # their covariances with all components
+    for a in range(len(S)):
+        weight = np.eye(len(S))[a]
+        left = S[a, a] - np.sum(done[:, a] ** 2)
+        if left <= NOTHING * S[a, a] or S[a, a] <= 0:
+            continue
+        unit = V @ weight - sum((d[a] * u for d, u in zip(done, units, strict=True)), np.zeros(len(V)))
+        units.append(unit / np.sqrt(left))
+        row = S[a] - done.T @ done[:, a]
+        done = np.concatenate([done, (row / np.sqrt(left))[None]])
+    return np.array(units).reshape(-1, len(V))

@@ -1,0 +1,262 @@
+"""Recursive Weiss-Weinstein: closed forms, a dense Gram matrix, minimum mean square errors on a grid, refusals."""
+
+from itertools import pairwise, product
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import locbounds as lb
+from locbounds.bounds.weinstein import weiss_weinstein_recursion
+from locbounds.noise.log_coefficient import log_bhattacharyya, log_coefficient
+from locbounds.registry import method
+from locbounds.verdict import Status
+
+ROUNDING = 1e-8  # relative, of the closed form; the same algebra through some hundred operations
+TABLE = 5e-4  # relative, of the logarithm of a tabulated coefficient
+SIGMAS = 4.0
+NOT_VACUOUS = 3.0  # in the mean square, of states that are moved one at a time
+
+
+def gaussian_problem(steps=4, n=2):
+    rng = np.random.default_rng(1)
+    F = 0.7 * rng.normal(size=(steps, n, n))
+    root = rng.normal(size=(steps + 1, n, n))
+    S = root @ np.swapaxes(root, 1, 2) + 0.3 * np.eye(n)
+    return F, S[1:], S[0], rng.normal(size=(steps, n))
+
+
+def joint_information(F, Q, P0, H):
+    """Of x_0..x_k from the prior and all measurements ``H_j x_j + N(0, 1)`` up to k, for every k."""
+    n, found = len(P0), []
+    J = np.zeros((n * (len(F) + 1),) * 2)
+    J[:n, :n] = np.linalg.inv(P0)
+    found.append(J[:n, :n].copy())
+    for k in range(1, len(F) + 1):
+        E = np.zeros((n, len(J)))
+        E[:, n * k : n * (k + 1)], E[:, n * (k - 1) : n * k] = np.eye(n), -F[k - 1]
+        J = J + E.T @ np.linalg.inv(Q[k - 1]) @ E
+        J[n * k : n * (k + 1), n * k : n * (k + 1)] += np.outer(H[k - 1], H[k - 1])
+        found.append(J[: n * (k + 1), : n * (k + 1)])
+    return found
+
+
+class Gaussians:
+    def __init__(self, H):
+        self.H = H
+
+    def single(self, j, u):
+        return np.zeros(u.shape[:-1]) if j == 0 else -((u @ self.H[j - 1]) ** 2) / 8
+
+    def excess(self, j, g, h):
+        return np.zeros((len(h), len(g)))
+
+
+def test_linear_gaussian_is_the_closed_form_and_tends_to_the_kalman_variance():
+    F, Q, P0, H = gaussian_problem()
+    n = len(P0)
+    for h in (1.0, 0.3, 1e-3):
+        shifts = h * np.broadcast_to(np.eye(n), (len(F) + 1, n, n))
+        got = weiss_weinstein_recursion(F, Q, P0, shifts, Gaussians(H))
+        for k, J in enumerate(joint_information(F, Q, P0, H)):
+            closed = (h**2 / 4) * np.linalg.inv(np.sinh(h**2 * J / 4))[-n:, -n:]
+            np.testing.assert_allclose(got[k], closed, rtol=ROUNDING if h > 0.01 else 1e-6)
+            kalman = np.linalg.inv(J)[-n:, -n:]
+            assert np.trace(got[k]) <= np.trace(kalman) * (1 + 1e-6)
+            if h < 0.01:
+                np.testing.assert_allclose(got[k], kalman, rtol=1e-6)
+
+
+ONE = np.ones((3, 1, 1))
+SURE = lb.MarkovSight([1.0], [[1.0]])
+
+
+def walk(noises, chain=SURE, **changes):
+    """A random walk of three steps, seen through 1.5 x + noise."""
+    options = dict(
+        times=lb.Times.uniform(step_s=1.0, steps=3),
+        prior=lb.GaussianPrior([1.0], [[4.0]]),
+        motion=lb.LinearMotion(ONE, 0.5 * ONE, position_index=(0,)),
+        channels=lb.AdditiveChannel(lambda x, mode, k: 1.5 * x[0] + 2.0, noises),
+        chains=chain,
+    )
+    return lb.JumpMarkov(**(options | changes))
+
+
+def test_a_smooth_linear_model_gives_the_kalman_variance_at_all_horizons():
+    smooth = walk([lb.Gaussian(0.3, 1.2)])
+    J = joint_information(ONE, 0.5 * ONE, np.array([[4.0]]), np.full((3, 1), 1.5 / 1.2))
+    found = np.array([np.linalg.inv(j)[-1, -1] for j in J])
+    states = lb.wwb_recursive(smooth, moved="states").position_mse
+    np.testing.assert_allclose(states, found, rtol=1e-3)
+    assert np.all(states <= found * (1 + 1e-9))
+    np.testing.assert_allclose(lb.wwb_recursive(smooth).position_mse, found, rtol=ROUNDING)
+    ahead = lb.wwb_recursive(smooth, horizon="predict:2")
+    np.testing.assert_allclose(ahead.position_mse, [4.0, 4.5, 5.0, found[1] + 1.0], rtol=ROUNDING)
+    assert "ranges-2-steps-old" in ahead.sees
+    whole = lb.wwb_recursive(smooth, horizon="smooth")
+    np.testing.assert_allclose(whole.position_mse, np.diag(np.linalg.inv(J[-1])), rtol=ROUNDING)
+    with pytest.raises(lb.RefusedError, match="no smoothing bound"):
+        lb.wwb_recursive(smooth, horizon="smooth", moved="states")
+
+
+def test_whole_paths_of_a_singular_motion_give_its_kalman_covariance():
+    """Rank-one Q, a state component that is known at the start, two channels, one of them silent at step 2."""
+    F = np.broadcast_to([[1.0, 1.0], [0.0, 1.0]], (3, 2, 2))
+    Q = np.broadcast_to(np.outer([0.5, 1.0], [0.5, 1.0]), (3, 2, 2))
+    model = walk(
+        [lb.Gaussian(0.0, 1.0)],
+        prior=lb.GaussianPrior([0.0, 0.0], np.diag([4.0, 0.0])),
+        motion=lb.LinearMotion(F, Q, position_index=(0,)),
+        channels=[
+            lb.AdditiveChannel(lambda x, mode, k: x[0], [lb.Gaussian(0.0, 1.0)]),
+            lb.AdditiveChannel(lambda x, mode, k: x[1] - x[0], [lb.Gaussian(0.0, 2.0)], reports=[True, False, True]),
+        ],
+    )
+    bound = lb.wwb_recursive(model)
+    P, found = np.diag([4.0, 0.0]), [np.diag([4.0, 0.0])]
+    for k in range(3):
+        P = F[k] @ P @ F[k].T + Q[k]
+        for h, r in [((1.0, 0.0), 1.0)] + ([((-1.0, 1.0), 4.0)] if k != 1 else []):
+            P = P - np.outer(P @ h, P @ h) / (h @ P @ np.array(h) + r)
+        found.append(P)
+    np.testing.assert_allclose(bound.covariance, found, rtol=1e-6, atol=1e-9)
+    with pytest.raises(lb.RefusedError, match="singular"):
+        lb.wwb_recursive(model, moved="states")
+
+
+STICKY = lb.MarkovSight([0.7, 0.3], [[0.8, 0.2], [0.4, 0.6]])
+FRESH = lb.MarkovSight([0.7, 0.3], [[0.7, 0.3], [0.7, 0.3]])
+SIGHTS = (lb.Gaussian(0.0, 0.5), lb.Uniform(0.0, 6.0))
+
+
+def test_a_chain_that_is_told_agrees_with_the_dense_gram_matrix_over_all_its_sequences():
+    """Every product of coefficients averaged over the 2^3 sequences, no recursion, no blocks."""
+    scale, sizes, model = 0.7, np.array([0.5, 1.3]), walk(SIGHTS, STICKY)
+    got = lb.wwb_recursive(model, sizes=sizes, scale=scale, moved="states")
+    assert got.verdict.status is Status.CONDITIONAL
+    assert "told the modes" in got.verdict.reasons[0]
+    assert got.sees == {"ranges", "sight"}
+    T, start = np.array([[0.8, 0.2], [0.4, 0.6]]), np.array([0.7, 0.3])
+    log_rho = [lambda u: -(u**2) / 8 / 0.25, lambda u: np.log(np.maximum(1 - np.abs(u) / 6, 0.0))]
+    least = 0.25
+    for k in range(4):
+        last = np.arange(k + 1) == k
+        after, seen = np.where(last, 0.0, 1 / 0.5), np.where(np.arange(k + 1) > 0, 1.5**2 / least, 0.0)
+        before = np.where(np.arange(k + 1) == 0, 1 / 4.0, 1 / 0.5)
+        whole = before + np.append(np.full(k, 1 / 0.5), 1 / 0.5 if k < 3 else 0.0) + seen
+        lengths = scale * sizes * (1 / np.sqrt(whole))[:, None]  # test shifts of every state, as the library has them
+        moves = np.concatenate([np.outer(h, np.eye(k + 1)[j]) for j, h in enumerate(lengths)])
+        J = np.diag(before + after) - (np.eye(k + 1, k=1) + np.eye(k + 1, k=-1)) / 0.5
+
+        def eta(u, J=J, k=k):
+            total = 0.0
+            for modes in product((0, 1), repeat=k + 1):
+                p = start[modes[0]] * np.prod([T[a, b] for a, b in pairwise(modes)])
+                total += p * np.exp(sum(log_rho[modes[j]](1.5 * u[j]) for j in range(1, k + 1)))
+            return np.exp(-u @ J @ u / 8) * total
+
+        with np.errstate(divide="ignore"):
+            single = np.array([eta(u) for u in moves])
+            G = np.array([[2 * (eta(u - v) - eta(u + v)) for v in moves] for u in moves]) / np.outer(single, single)
+        target = moves[:, -1]
+        assert got.position_mse[k] == pytest.approx(float(target @ np.linalg.solve(G, target)), rel=TABLE)
+
+
+def grid_mmse(model, densities, told, runs=200, seed=0):
+    """Mean of the posterior variance at step 3 over draws, by a filter on a grid of places (and modes)."""
+    rng = np.random.default_rng(seed)
+    x = np.linspace(-9.0, 11.0, 401)
+    T, start = np.asarray(model.transitions(0))[0], np.asarray(model.chains[0].start)
+    kernel = np.exp(-((x[:, None] - x) ** 2) / (2 * 0.5))
+    kernel /= kernel.sum(0)
+    found = []
+    for _ in range(runs):
+        place, mode = 1.0 + 2.0 * rng.normal(), rng.choice(len(start), p=start)
+        p = start[:, None] * np.exp(-((x - 1.0) ** 2) / 8)
+        for _ in range(3):
+            place, mode = place + np.sqrt(0.5) * rng.normal(), rng.choice(len(start), p=T[mode])
+            z = 1.5 * place + 2.0 + densities[mode][1](rng)
+            p = T.T @ (p @ kernel.T)
+            likelihood = np.stack([f(z - 1.5 * x - 2.0) for f, _ in densities])
+            p = p * likelihood
+            if told:
+                p[np.arange(len(start)) != mode] = 0.0
+            p /= p.sum()
+        q = p.sum(0)
+        found.append(q @ x**2 - (q @ x) ** 2)
+    return np.mean(found), np.std(found) / np.sqrt(runs)
+
+
+def bell(std):
+    return (lambda e: np.exp(-((e / std) ** 2) / 2) / std / np.sqrt(2 * np.pi)), (lambda rng: std * rng.normal())
+
+
+def flat(low, high):
+    return (lambda e: ((e > low) & (e < high)) / (high - low)), (lambda rng: rng.uniform(low, high))
+
+
+def decay(mean):
+    return (lambda e: np.exp(-np.maximum(e, 0) / mean) * (e > 0) / mean), (lambda rng: rng.exponential(mean))
+
+
+@pytest.mark.parametrize(
+    ("noises", "densities", "chain", "told"),
+    [
+        ([lb.Uniform(-2.0, 2.0)], [flat(-2, 2)], SURE, False),
+        ([lb.Exponential(1.0)], [decay(1.0)], SURE, False),
+        pytest.param(SIGHTS, [bell(0.5), flat(0, 6)], FRESH, False, marks=pytest.mark.slow),
+        (SIGHTS, [bell(0.5), flat(0, 6)], STICKY, True),
+    ],
+    ids=["uniform", "exponential", "sight drawn anew", "told sight"],
+)
+def test_the_bound_is_below_the_minimum_mean_square_error_and_not_far(noises, densities, chain, told):
+    model = walk(noises, chain)
+    bound = lb.wwb_recursive(model)
+    mmse, error = grid_mmse(model, densities, told)
+    assert bound.position_mse[3] < mmse + SIGMAS * error
+    states = lb.wwb_recursive(model, moved="states")
+    assert mmse / NOT_VACUOUS < states.position_mse[3] <= bound.position_mse[3]
+    scale = float(states.diagnostics["scale"][3])
+    assert 0.03 < scale < 60
+    fewer = lb.wwb_recursive(model, sizes=(1.2,), scale=scale, moved="states")
+    assert fewer.position_mse[3] <= states.position_mse[3] * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"motion": [lb.LinearMotion(ONE, q * ONE, position_index=(0,)) for q in (0.5, 1.0)], "chains": STICKY,
+          "channels": lb.AdditiveChannel(lambda x, mode, k: x[0], SIGHTS)}, "the motion has modes"),
+        ({"channels": lb.AdditiveChannel(lambda x, mode, k: jnp.abs(x[0]), [lb.Gaussian(0, 1)])}, "not linear"),
+        ({"channels": lb.AdditiveChannel(lambda x, mode, k: x[0] + mode, SIGHTS), "chains": STICKY}, "the mode"),
+    ],
+)  # fmt: skip
+def test_other_models_are_refused_with_the_reason(changes, words):
+    model = walk([lb.Gaussian(0.0, 1.0)], **changes)
+    verdict = method("wwb-recursive").verdict(model)
+    assert verdict.status is Status.REFUSED
+    with pytest.raises(lb.RefusedError, match=words):
+        lb.wwb_recursive(model)
+
+
+def test_a_scenario_with_ranges_is_refused_and_wrong_numbers_are_named():
+    with pytest.raises(lb.RefusedError, match="not linear"):
+        lb.wwb_recursive(lb.papers.fritsche2013.scenario(steps=2))
+    for wrong in ({"sizes": ()}, {"sizes": (1.0, -1.0)}, {"scale": 0.0}, {"moved": "all"}):
+        with pytest.raises(lb.InputError, match=r"sizes|scale|moved"):
+            lb.wwb_recursive(walk([lb.Gaussian(0.0, 1.0)]), **wrong)
+
+
+def test_tables_of_coefficients_agree_with_quadrature_and_with_closed_forms():
+    h = np.geomspace(1e-6, 3.9, 40)
+    np.testing.assert_allclose(np.exp(log_coefficient(lb.Uniform(-2.0, 2.0))(h)), 1 - h / 4, rtol=TABLE)
+    exponential = log_coefficient(lb.Exponential(1.0))
+    np.testing.assert_allclose(exponential(h), -h / 2, rtol=1e-6)
+    cut = lb.TruncatedGaussian(0.0, 1.0, -2.0, 2.0) + lb.Uniform(0.0, 1.0)
+    h = np.geomspace(1e-3, 4.9, 30)
+    np.testing.assert_allclose(log_coefficient(cut)(h), log_bhattacharyya(cut, h), rtol=TABLE)
+    assert np.all(log_coefficient(cut)(np.array([5.0, 7.0])) == -np.inf)
+    apart = lb.Mixture([0.5, 0.5], [lb.Uniform(0.0, 1.0), lb.Uniform(100.0, 101.0)])
+    with pytest.raises(lb.RefusedError, match="far apart"):
+        log_coefficient(apart)
