@@ -41,7 +41,7 @@ def seconds(run: Callable[[], object], repeats: int = REPEATS) -> tuple[float, f
     return min(out), float(np.median(out))
 
 
-def ours(plan: lb.Plan, points: np.ndarray) -> Callable[[], np.ndarray]:
+def ours(plan: lb.Plan, points: np.ndarray) -> Callable[[], object]:
     return lambda: lb.crlb(plan, points).cep()
 
 

@@ -105,8 +105,8 @@ METHODS: dict[str, Method] = {
             "locbounds.bounds.bcrb:bcrb",
             ("Gaussian prior and motion", "smooth noise"),
             "Not a bound for filters that are told the sight, nor for the error along one fixed track; optimistic when "
-            "real errors are correlated in time beyond the chain. Chains that links share and motion that switches take "
-            "a JumpMarkov model.",
+            "real errors are correlated in time beyond the chain. Chains that links share and motion that switches "
+            "take a JumpMarkov model.",
             ("fritsche2013", "louis1982"),
             (*COMMON, SMOOTH_NOISE),
             on_plan=BAYESIAN_PLAN,
