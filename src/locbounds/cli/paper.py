@@ -38,7 +38,7 @@ def paper(
             "--runs",
             min=2,
             help="Tracks for every filter; by default 10,000 (the paper: 20,000), for chen2010 400 (the paper: 50), "
-            "for prieto2011 128.",
+            "for prieto2011 96.",
         ),
     ] = None,
     requirement: RequirementOption = "e911",

@@ -23,7 +23,7 @@ from locbounds.ranging import (
 from locbounds.ranging.bounds import slopes
 from locbounds.result import Result
 
-SAMPLES, RUNS, REPEATS = 10_000, 128, 12
+SAMPLES, RUNS, REPEATS = 10_000, 96, 12
 COUNTS = (100, 1_000, 10_000, 100_000)  # draws whose effect on the numbers as printed is shown
 RANDOM = "toa, random tracks"
 VALID, CONDITIONAL, INVALID, ESTIMATOR = "valid", "conditional", "not a bound", "estimator"
@@ -128,7 +128,7 @@ def study(
     samples: int | None = None,
     runs: int | None = None,
     seed: int = 0,
-    particles: int = 2_000,
+    particles: int = 1_500,
     steps: int = STEPS,
     announce: Callable[[str], None] = lambda text: None,
 ) -> Study:
@@ -139,7 +139,7 @@ def study(
     samples
         Draws of the Monte Carlo information as printed; 10,000 by default.
     runs
-        Runs of every filter; 128 by default.
+        Runs of every filter; 96 by default.
     seed
         Of all random numbers.
     particles
