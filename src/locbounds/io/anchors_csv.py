@@ -3,7 +3,9 @@
 import csv
 import math
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from locbounds.errors import InputError
 from locbounds.io.complain import DEGREES_REMEDY, close_key, is_degrees
@@ -86,3 +88,32 @@ def _remedy(name: str, header: list[str]) -> str:
     return (
         f"Rename the column {close} to {name}" if close else f"The columns are {', '.join(COLUMNS[:3])} and z_m in 3-D"
     )
+
+
+def anchor_positions(anchors: Mapping[str, Any], anchors_csv: str | None, folder: Path) -> dict[str, Any]:
+    """Positions of a file's anchors: from its own keys, otherwise from the table that it names.
+
+    Parameters
+    ----------
+    anchors
+        Name -> section with a key ``position_m``, which may be absent where the table has the anchor.
+    anchors_csv
+        The table, relative to ``folder``.
+
+    Raises
+    ------
+    InputError
+        If an anchor has no position, or there is none.
+    """
+    positions: dict[str, Any] = {} if anchors_csv is None else dict(read_anchors(folder / anchors_csv))
+    for name, own in anchors.items():
+        if own.position_m is not None:
+            positions[name] = own.position_m
+        elif name not in positions:
+            raise InputError(
+                f"anchor {name} has no position" + (f" and is not in {anchors_csv}" if anchors_csv else ""),
+                f"anchors.{name}.position_m: {type(own).model_fields['position_m'].description}",
+            )
+    if not positions:
+        raise InputError("there are no anchors", "Add [anchors] with a line NAME = { position_m = [x, y] } each")
+    return positions

@@ -10,7 +10,7 @@ import numpy as np
 from locbounds.axes import LOS, NLOS, ndarray
 from locbounds.errors import InputError
 from locbounds.io import noise_families
-from locbounds.io.anchors_csv import read_anchors
+from locbounds.io.anchors_csv import anchor_positions
 from locbounds.io.complain import quoted, unknown_key_remedy
 from locbounds.io.schema import (
     MOTION_KEYS,
@@ -223,17 +223,7 @@ def merged(shared: LinksSection, own: AnchorTable | None) -> LinksSection:
 
 def build(file: ScenarioFile, folder: Path) -> Scenario:
     """The scenario of a validated file; ``folder`` is where a relative ``anchors_csv`` lies."""
-    positions = {} if file.anchors_csv is None else read_anchors(folder / file.anchors_csv)
-    for name, own in file.anchors.items():
-        if own.position_m is not None:
-            positions[name] = own.position_m
-        elif name not in positions:
-            raise InputError(
-                f"anchor {name} has no position" + (f" and is not in {file.anchors_csv}" if file.anchors_csv else ""),
-                f"anchors.{name}.position_m: {AnchorTable.model_fields['position_m'].description}",
-            )
-    if not positions:
-        raise InputError("there are no anchors", "Add [anchors] with a line NAME = { position_m = [x, y] } each")
+    positions = anchor_positions(file.anchors, file.anchors_csv, folder)
     dim = len(file.prior.position_m)
     for name, position in positions.items():
         if len(position) != dim:

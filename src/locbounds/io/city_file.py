@@ -15,6 +15,7 @@ from locbounds.io.complain import quoted, unknown_key_remedy
 from locbounds.io.footprints import read_city
 from locbounds.io.link_table import read_links
 from locbounds.io.schema import Section, key, needed
+from locbounds.io.toml import parse_toml
 from locbounds.io.values import Numbers, Point, Positive, Text, Whole, fail
 from locbounds.propagation import City, LinkTable
 from locbounds.propagation.city import GAP_M
@@ -129,15 +130,12 @@ def load_city(path: str | os.PathLike) -> CityFile:
     """
     path = Path(path)
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"cannot read {path}: {reason.lower()}", "Give a TOML file with a section [city]") from error
-    except tomllib.TOMLDecodeError as error:
-        remedy = "Look at that line: quotes, brackets, one key = value per line"
-        raise InputError(f"{path.name} is not valid TOML: {error}", remedy) from error
     try:
-        keys = CityFileKeys.model_validate(raw)
+        keys = CityFileKeys.model_validate(parse_toml(text, path.name))
     except ValidationError as error:
         raise _complain(error, path.name) from None
     places = (

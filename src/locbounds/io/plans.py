@@ -3,7 +3,6 @@
 import math
 import os
 import re
-import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,11 +10,12 @@ import numpy as np
 from pydantic import ValidationError
 
 from locbounds.errors import InputError
-from locbounds.io.anchors_csv import read_anchors
+from locbounds.io.anchors_csv import anchor_positions
 from locbounds.io.build import at, build_noises
 from locbounds.io.complain import close_key, complain, quoted
 from locbounds.io.plan_schema import AreaSection, PlanAnchor, PlanFile, PlanLinks, PriorTable, Shape
 from locbounds.io.schema import NlosTable, NoiseTable
+from locbounds.io.toml import parse_toml
 from locbounds.noise import Gaussian, Noise
 from locbounds.plan import FLAT, Plan, aoa, rss, soft, tdoa, toa
 from locbounds.priors import GaussianPrior, PositionPrior, PriorMixture, Prism, UniformBox, UniformDisc, UniformPolygon
@@ -99,12 +99,7 @@ def read_text(text: str, *, folder: str | os.PathLike = ".", source: str = "plan
     plan: unknown key links.los.std_m = 4
     Did you mean std_db? The errors of "rss" are in dB
     """
-    try:
-        keys = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            f"{source} is not valid TOML: {error}", "Look at that line: quotes, brackets, one key = value per line"
-        ) from error
+    keys = parse_toml(text, source)
     units: dict[str, str] = {}
     try:
         file = PlanFile.model_validate(_in_metres(keys, units))
@@ -182,17 +177,7 @@ def _in_units(text: str, unit: str) -> str:
 
 
 def _build(file: PlanFile, folder: Path) -> PlanMap:
-    positions = {} if file.anchors_csv is None else read_anchors(folder / file.anchors_csv)
-    for name, own in file.anchors.items():
-        if own.position_m is not None:
-            positions[name] = own.position_m
-        elif name not in positions:
-            raise InputError(
-                f"anchor {name} has no position" + (f" and is not in {file.anchors_csv}" if file.anchors_csv else ""),
-                f"anchors.{name}.position_m: {PlanAnchor.model_fields['position_m'].description}",
-            )
-    if not positions:
-        raise InputError("there are no anchors", "Add [anchors] with a line NAME = { position_m = [x, y] } each")
+    positions = anchor_positions(file.anchors, file.anchors_csv, folder)
     dims = {len(p) for p in positions.values()}
     if len(dims) > 1:
         raise InputError("anchors have 2 and 3 coordinates", "Use the same number of coordinates everywhere")

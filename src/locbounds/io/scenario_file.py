@@ -1,7 +1,6 @@
 """Scenario files: TOML, SI units in the keys, comments that teach."""
 
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from locbounds.io.build import build
 from locbounds.io.complain import complain
 from locbounds.io.files import atomic_write_text
 from locbounds.io.schema import ScenarioFile
+from locbounds.io.toml import parse_toml
 from locbounds.io.write import file_keys
 from locbounds.scenario import Scenario
 
@@ -49,12 +49,7 @@ def loads(text: str, *, folder: str | os.PathLike = ".", source: str = "scenario
     scenario: unknown key time.step_ms = 200 (2 more after this one)
     Did you mean step_s? Known here: step_s, steps, times_s
     """
-    try:
-        keys = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            f"{source} is not valid TOML: {error}", "Look at that line: quotes, brackets, one key = value per line"
-        ) from error
+    keys = parse_toml(text, source)
     try:
         file = ScenarioFile.model_validate(_hoisted(keys))
     except ValidationError as error:
