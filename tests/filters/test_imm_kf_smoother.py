@@ -91,4 +91,4 @@ def test_it_says_that_it_sees_the_future(paper):
     result = lb.evaluate(lb.ImmKfSmoother(), scenario, runs=8)
     with pytest.raises(lb.RefusedError, match="future-ranges") as refused:
         result.efficiency(lb.enumer(scenario, samples=1))
-    assert "smoothers only" in str(refused.value)
+    assert "horizon='smooth'" in str(refused.value)

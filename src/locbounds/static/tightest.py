@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from locbounds.errors import RefusedError
 from locbounds.plan import Plan
-from locbounds.registry import bounds_of, load, method
+from locbounds.registry import RANGES, bounds_of, load, method
 from locbounds.result import Result
 from locbounds.result import tightest as of_results
 from locbounds.verdict import Status
@@ -45,17 +45,21 @@ class Tightest(NamedTuple):
         return self.reason
 
 
-def tightest(subject: Plan | Sequence[Result], *, rtol: float = 1e-3) -> Tightest | list[Result]:
+def tightest(
+    subject: Plan | Sequence[Result], *, rtol: float = 1e-3, sees: frozenset[str] = RANGES
+) -> Tightest | list[Result]:
     """The tightest valid bound: of a plan, computed and chosen; of results, those that none is tighter than.
 
     Parameters
     ----------
     subject
         A plan with a prior, whose bounds ``bcrb``, ``wwb`` and ``ezzb`` are computed as far as they apply. Or results
-        of bounds for one scenario: the largest of the valid ones that hold for estimators which see the ranges only,
-        compared by average RMSE; those within four standard errors of it are returned with it.
+        of bounds for one scenario: the largest of the valid ones that hold for estimators which see no more than
+        ``sees``, compared by average RMSE; those within four standard errors of it are returned with it.
     rtol
         Precision of the bounds of a plan.
+    sees
+        What the estimators of a scenario see, by default the ranges up to the present step.
 
     Returns
     -------
@@ -75,7 +79,7 @@ def tightest(subject: Plan | Sequence[Result], *, rtol: float = 1e-3) -> Tightes
     ['bcrb']
     """
     if not isinstance(subject, Plan):
-        return of_results(list(subject))
+        return of_results(list(subject), sees=sees)
     found, refused = [], {}
     for entry in [method("bcrb"), *(m for m in bounds_of("plan") if m.id in CANDIDATES)]:
         verdict = entry.verdict(subject)
