@@ -107,16 +107,14 @@ def track(
 
 def applicable_bounds(model: "Scenario", ids: str | None) -> "list[Method]":
     """The bounds that were named, or all that apply."""
-    from locbounds.registry import bounds_of, method
+    from locbounds.registry import REMEDIES, bounds_of, method
     from locbounds.verdict import Status
 
     if ids is not None:
         chosen = [] if ids == "none" else [method(id.strip(), "bound") for id in ids.split(",")]
         for m in chosen:
             if m.subject != "scenario":
-                python = "Call it from Python on a JumpMarkov model"
-                remedy = python if m.subject == "model" else f"Run locbounds {m.subject}"
-                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", remedy)
+                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", REMEDIES[m.subject])
         return chosen
     applicable = [m for m in bounds_of("scenario") if m.verdict(model).status is not Status.REFUSED]
     known = any(m.id == "known-sight" for m in applicable)  # then nothing is left to average over

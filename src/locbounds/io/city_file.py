@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -94,18 +93,6 @@ class CityFile(NamedTuple):
         """The rectangle of the map."""
         bounds = self.keys.city.area_m or (() if self.city is None else self.city.bounds)
         return tuple(float(v) for v in bounds)
-
-
-def is_city_file(path: str | os.PathLike) -> bool:
-    """Whether a TOML file has a section ``[city]``; False where it cannot be read.
-
-    >>> is_city_file("absent.toml")
-    False
-    """
-    try:
-        return "city" in tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
-        return False
 
 
 def load_city(path: str | os.PathLike) -> CityFile:

@@ -13,6 +13,7 @@ from locbounds.errors import InputError
 from locbounds.io.anchors_csv import anchor_positions
 from locbounds.io.build import at, build_noises
 from locbounds.io.complain import close_key, complain, quoted
+from locbounds.io.kinds import expect
 from locbounds.io.plan_schema import AreaSection, PlanAnchor, PlanFile, PlanLinks, PriorTable, Shape
 from locbounds.io.schema import NlosTable, NoiseTable
 from locbounds.io.toml import parse_toml
@@ -100,6 +101,7 @@ def read_text(text: str, *, folder: str | os.PathLike = ".", source: str = "plan
     Did you mean std_db? The errors of "rss" are in dB
     """
     keys = parse_toml(text, source)
+    expect(keys, "plan", source)
     units: dict[str, str] = {}
     try:
         file = PlanFile.model_validate(_in_metres(keys, units))
