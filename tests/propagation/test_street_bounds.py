@@ -221,7 +221,18 @@ def test_the_program(files):
         ("blocks.geojson", "absent.geojson", "absent.geojson", "GeoJSON"),
         ("area_m = [-10, -10, 80, 80]", "area_m = [1, 1, 29, 29]", "no street is left", "area"),
         ("area_m = [-10, -10, 80, 80]", "area_m = [9, 9, 2, 2]", "area_m = [9", "four numbers"),
-        ("std_m = 3", "std_m = 3\nnearest = 9", "9 nearest of 4 anchors", "Give fewer"),
+        (
+            "std_m = 3",
+            "std_m = 3\nnearest = 9",
+            "city.toml: measure.nearest is 9, and there are 4 anchors",
+            "from 2 to 4",
+        ),
+        (
+            "std_m = 3",
+            "std_m = 3\nnearest = 1",
+            "measure.nearest is 1, and there are 4 anchors: a difference needs 2",
+            "from 2",
+        ),
         ("area_m = [-10, -10, 80, 80]", "area_m = [-10, -10, 80, 80]\nmargin_m = 60", "no street is left", "margin"),
     ],
 )
@@ -245,8 +256,8 @@ def test_a_cell_that_no_anchor_reaches_is_left_out():
 def test_bad_input_ends_with_two_and_leaves_nothing(files):
     done = run(files, TEXT.replace("std_m = 3", "std_m = 3\nnearest = 9"))
     assert done.exit_code == 2
-    assert "error: the 9 nearest of 4 anchors are wanted" in done.output
-    assert "remedy: Give fewer" in done.output
+    assert "error: city.toml: measure.nearest is 9, and there are 4 anchors" in done.output
+    assert "remedy: Add anchors, or give measure.nearest a number from 2 to 4" in done.output
     done = run(files, TEXT, "--grid", "50")
     assert done.exit_code == 2
     assert "error: --grid is for plan files" in done.output

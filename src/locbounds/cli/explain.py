@@ -19,7 +19,7 @@ def explain(
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Say what a bound or filter assumes, when it fails and whom to cite; with a scenario or plan file, what holds there.
+    """Say what a bound or filter assumes, when it fails, whom to cite; with a scenario or plan file, what holds there.
 
     Example: locbounds explain bcrb --scenario scenario.toml
     """

@@ -136,6 +136,15 @@ def load_city(path: str | os.PathLike) -> CityFile:
         places[name] = anchor.position_m
     if not places:
         raise InputError(f"{path.name} has no anchors", "Add [anchors] with a line NAME = { position_m = [x, y] } each")
+    least = 2 if "tdoa" in keys.measure.kinds else 1
+    if not least <= keys.measure.nearest <= len(places):
+        few = len(places) < least
+        raise InputError(
+            f"{path.name}: measure.nearest is {keys.measure.nearest}, and there "
+            + ("is 1 anchor" if len(places) == 1 else f"are {len(places)} anchors")
+            + (": a difference needs 2" if least == 2 and min(keys.measure.nearest, len(places)) < 2 else ""),
+            "Add anchors" if few else f"Add anchors, or give measure.nearest a number from {least} to {len(places)}",
+        )
     roofs = tuple(name for name, anchor in keys.anchors.items() if anchor.roof)
     if keys.city.links_csv is not None:
         return CityFile(keys, None, read_links(path.parent / keys.city.links_csv, places), places, roofs)
