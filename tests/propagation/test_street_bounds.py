@@ -231,6 +231,12 @@ def test_the_program(files):
     [
         ("d = { position_m = [15, 15], roof = true }", "d = { position_m = [15, 15] }", "inside building 0", "roof"),
         ("std_m = 3", "std_db = 3", "unknown key measure.std_db", "std_m"),
+        (
+            '["toa", "tdoa"]',
+            '["toa", "aoa"]',
+            "measure.kinds.1 is 'aoa', but must be 'toa' or 'tdoa'",
+            "times of arrival",
+        ),
         ("std_m = 3", "std_m = -3", "measure.std_m", "standard deviation"),
         ('buildings = "blocks.geojson"', "", "neither buildings nor links_csv", "buildings.geojson"),
         ("[measure]", 'links_csv = "links.csv"\n[measure]', "has buildings and links_csv", "one of them"),

@@ -167,7 +167,7 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted, ho
             efficient = str(r.efficiency(matching[0])) if matching else ""
             tails = " / ".join(f"{quantile(r, share)[0]:.3g}" for share in (0.67, 0.95))
         number = format_with_error(r.mean_position_rmse(), r.mean_position_rmse_stderr())
-        rows.append([r.id, r.kind, number, efficient, tails, "; ".join([str(r.verdict.status), *r.verdict.reasons])])
+        rows.append([r.id, r.kind, number, efficient, tails, str(r.verdict._replace(warnings=()))])
     if json:
         keys = ("method", "kind", "position_rmse_m", "stderr_m", "verdict")
         values = [

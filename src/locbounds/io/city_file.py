@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import ValidationError, model_validator
 
 from locbounds.errors import InputError
 from locbounds.io.anchors_csv import read_anchors
-from locbounds.io.complain import quoted, unknown_key_remedy
+from locbounds.io.complain import complain
 from locbounds.io.footprints import read_city
 from locbounds.io.link_table import read_links
 from locbounds.io.schema import Section, key, needed
@@ -124,7 +124,7 @@ def load_city(path: str | os.PathLike) -> CityFile:
     try:
         keys = CityFileKeys.model_validate(parse_toml(text, path.name))
     except ValidationError as error:
-        raise _complain(error, path.name) from None
+        raise complain(error, path.name, CityFileKeys) from None
     places = (
         {name: p[:2] for name, p in read_anchors(path.parent / keys.anchors_csv).items()} if keys.anchors_csv else {}
     )
@@ -155,23 +155,3 @@ def load_city(path: str | os.PathLike) -> CityFile:
         )
     city = read_city(path.parent / keys.city.buildings, gap_m=keys.city.gap_m)
     return CityFile(keys, city, None, places, roofs)
-
-
-def _complain(error: ValidationError, source: str) -> InputError:
-    first: Any = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
-    location: tuple[Any, ...] = first["loc"]
-    model: Any = CityFileKeys
-    for part in location[:-1]:
-        inner = {"city": CitySection, "measure": MeasureSection, "anchors": CityAnchor}.get(str(part))
-        model = inner or model
-    where, name = ".".join(map(str, location)), str(location[-1]) if location else ""
-    field = model.model_fields.get(name)
-    teaching = (field.description or "") if field else ""
-    if first["type"] == "extra_forbidden":
-        remedy = unknown_key_remedy(name, list(model.model_fields))
-        return InputError(f"{source}: unknown key {where} = {quoted(first['input'])}", remedy)
-    if first["type"] == "missing":
-        return InputError(f"{source}: {where} is missing", f"Add {name}: {teaching}")
-    if first["type"] == "locbounds":
-        return InputError(f"{source}: {where} {first['ctx']['cause']}", first["ctx"]["remedy"] or teaching)
-    return InputError(f"{source}: {where} is {quoted(first['input'])}: {first['msg']}", f"{name}: {teaching}")

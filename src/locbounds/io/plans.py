@@ -208,6 +208,9 @@ def _region(shape: Shape, path: str) -> PositionPrior:
             for name, rings in (("outline_m", [shape.outline_m]), ("holes_m", shape.holes_m or [])):
                 if any(len(corner) != 2 for ring in rings for corner in ring):
                     raise InputError(f"{name} has corners of three coordinates", "Give [x, y]; heights are height_m")
+            corners = np.asarray(shape.outline_m)
+            if len(corners) > 2 and np.linalg.matrix_rank(corners - corners[0]) < 2:
+                raise InputError("the corners of outline_m lie on one line", "Give corners that enclose an area")
             return UniformPolygon(shape.outline_m, shape.holes_m or ())
         if shape.center_m is not None:
             return UniformDisc(shape.center_m, shape.radius_m)
