@@ -7,6 +7,7 @@ import importlib
 from typing import Any, NamedTuple
 
 from locbounds.assumptions import COMMON, LINEAR_CHANNELS, LINEAR_MOTION
+from locbounds.citations import CITATIONS
 from locbounds.errors import InputError
 from locbounds.plan import Plan
 from locbounds.plan_assumptions import BAYESIAN_PLAN, ONE_UNIT, WITH_PRIOR
@@ -474,7 +475,12 @@ def describe(entry: Method) -> dict[str, Any]:
         "on_plan": [a.text for a in entry.on_plan],
         "fails": entry.fails,
         "cite": list(entry.references),
+        "references": [CITATIONS[key] for key in entry.references],
     }
+
+
+def _cite(keys: list[str]) -> list[str]:
+    return [f"cite     {key}: {CITATIONS[key]}" for key in keys]
 
 
 def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
@@ -501,14 +507,15 @@ def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
     violated the sight of every link is known at every step: the
     """
     if id in TOPICS:
-        return TOPICS[id]
+        text, _, keys = TOPICS[id].rpartition("cite     ")
+        return text + "\n".join(_cite(keys.split(", ")))
     check_subject(method(id), scenario)
     entry = describe(method(id))
     article = "an" if entry["kind"][0] in "aeiou" else "a"
     lines = [f"{entry['name']} ({entry['id']}), {article} {entry['kind']}", entry["summary"], ""]
     lines += [f"sees     {', '.join(entry['sees'])}", *(f"assumes  {text}" for text in entry["assumes"])]
     lines += [f"assumes  of a plan (one position): {text}" for text in entry["on_plan"]]
-    lines += [f"careful  {entry['fails']}", f"cite     {', '.join(entry['cite'])}"]
+    lines += [f"careful  {entry['fails']}", *_cite(entry["cite"])]
     if scenario is not None:
         lines += ["", f"for      {scenario.title or f'this {_kind(scenario)}'}"]
         checks = method(id).check(scenario)
