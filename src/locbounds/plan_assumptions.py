@@ -6,6 +6,7 @@ import numpy as np
 
 from locbounds.measurement import Bearing, PathLoss
 from locbounds.plan import Plan
+from locbounds.plan.jumps import black_box_jump
 from locbounds.verdict import REGULAR_PLAN, Assumption
 
 
@@ -33,7 +34,27 @@ def discontinuous(plan: Plan) -> str | None:
     for m, name in _measurements(plan):
         if not getattr(m, "continuous", True):
             return f"the measurement of {name} jumps where the line of sight is lost"
-    return None
+    return jumping_function(plan)
+
+
+def jumping_function(plan: Plan) -> str | None:
+    """Which function jumps, and where, or None."""
+    jump = black_box_jump(plan)
+    if jump is None:
+        return None
+    place = ", ".join(f"{x:.4g}" for x in jump.place)
+    return f"the function of channel {plan.channel_names[jump.channel]} jumps by {jump.size:.3g} at ({place})"
+
+
+def unresolved_jump(plan: Plan) -> str | None:
+    """Why short test vectors pass a jump by, or None."""
+    why = jumping_function(plan)
+    if why is None:
+        return None
+    return (
+        f"{why}: nodes of the quadrature step over it, and short test vectors do not see it; take ezzb, or cells "
+        "that do not straddle it (street_raster, raster_wwb)"
+    )
 
 
 def diverging_information(plan: Plan) -> str | None:
@@ -78,5 +99,6 @@ WITH_PRIOR = Assumption("the plan has a prior", no_prior)
 ONE_UNIT = Assumption("all measurements have the same unit", mixed_units)
 REGULAR_PRIOR = Assumption("the prior's density vanishes smoothly where it ends", irregular_prior)
 CONTINUOUS = Assumption("every measurement is continuous over the places that the prior allows", discontinuous)
+RESOLVED = Assumption("no function jumps: integrals over short test vectors miss it", unresolved_jump)
 FINITE_EXPECTATION = Assumption("the expected information is finite", diverging_information)
 BAYESIAN_PLAN = (WITH_PRIOR, REGULAR_PRIOR, REGULAR_PLAN, CONTINUOUS, FINITE_EXPECTATION)

@@ -10,7 +10,7 @@ from locbounds.assumptions import COMMON, LINEAR_CHANNELS, LINEAR_MOTION
 from locbounds.citations import CITATIONS
 from locbounds.errors import InputError
 from locbounds.plan import Plan
-from locbounds.plan_assumptions import BAYESIAN_PLAN, ONE_UNIT, WITH_PRIOR
+from locbounds.plan_assumptions import BAYESIAN_PLAN, ONE_UNIT, RESOLVED, WITH_PRIOR
 from locbounds.scenario import Scenario
 from locbounds.verdict import (
     DETERMINED,
@@ -182,7 +182,7 @@ METHODS: dict[str, Method] = {
             ("any prior", "any measurement"),
             "Loose at high noise with few test points; neither always above nor always below the EZZB.",
             ("weinstein1988", "mcguire2009"),
-            (WITH_PRIOR,),
+            (WITH_PRIOR, RESOLVED),
             subject="plan",
         ),
         Method(

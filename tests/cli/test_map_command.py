@@ -112,6 +112,18 @@ def test_a_plan_without_cramer_rao_bound_still_has_the_others(tmp_path):
     assert run(text, *FAST, "--methods", "none", "--out", "again").exit_code == 2
 
 
+def test_two_anchors_have_bayesian_numbers_and_a_note(tmp_path):
+    text = HALL.replace('"toa"', '"tdoa"').replace("c = { position_m = [20, 20] }\n", "")
+    done = run(text, *FAST, "--cells", "0", "--methods", "wwb,ezzb,mmse")
+    assert done.exit_code == 0, done.output
+    assert "no Cramér-Rao bound: 1 measured number cannot determine 2 coordinates" in done.output
+    found = {row["method"]: row for row in rows(tmp_path / "hall-out" / "methods.csv")}
+    assert found["crlb"]["verdict"] == "refused"
+    value = {id: float(found[id]["rmse_m"]) for id in ("wwb", "ezzb", "mmse")}
+    assert 0 < max(value["wwb"], value["ezzb"]) < value["mmse"]
+    assert not (tmp_path / "hall-out" / "map.csv").exists()
+
+
 def test_mixed_units_have_no_dilution_unless_weights_are_given(tmp_path):
     text = HALL.replace("[20, 20] }", '[20, 20], measure = "aoa", los = { std_deg = 3 } }')
     done = run(text, *FAST, "--methods", "none")
@@ -146,6 +158,7 @@ def test_three_dimensions_and_an_unknown_clock(tmp_path):
     assert {"gdop", "pdop", "hdop", "vdop", "tdop", "crlb_clock_m"} <= set(row)
 
 
+TWO = "b = { position_m = [40, 0] }\nc = { position_m = [20, 20] }"
 BOX = "low_m = [0, 0]\nhigh_m = [40, 20]"
 
 
@@ -157,7 +170,12 @@ BOX = "low_m = [0, 0]\nhigh_m = [40, 20]"
         (BOX, "outline_m = [[0, 0], [4, 4], [4, 0], [0, 4]]", [], ["crosses itself"]),
         ("c = { position_m = [20, 20] }", "c = { position_m = [20, 20], sight = 3 }", [], ["sight"]),
         ("[anchors]", "[prior]\nposition_m = [0, 0]\nposition_std_m = inf\n[anchors]", [], ["position_std_m"]),
-        ("b = { position_m = [40, 0] }\nc = { position_m = [20, 20] }", "", [], ["cannot determine"]),
+        (
+            "b = { position_m = [40, 0] }\nc = { position_m = [20, 20] }",
+            "",
+            ["--methods", "none"],
+            ["cannot determine"],
+        ),
         ("std_m", "std_db", [], ["std_db", "Did you mean std_m"]),
         (BOX, "low_m = [0, 0]\nhigh_m = [1e12, 1e12]", [], ["the area reaches", "local plane"]),
         ("", "", ["--grid", "1"], ["grid is 1"]),

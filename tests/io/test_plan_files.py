@@ -120,6 +120,22 @@ BOX = "low_m = [0, 0]\nhigh_m = [40, 20]"
 
 
 @pytest.mark.parametrize(
+    ("pairs", "what"),
+    [
+        ([("b = { position_m = [40, 0] }\nc = { position_m = [20, 20] }\n", "")], "cannot determine 2 coordinates"),
+        (
+            [("[area]", 'clock = "unknown"\n[area]'), ("c = { position_m = [20, 20] }\n", "")],
+            "cannot determine 2 coordinates and a clock",
+        ),
+        ([('"toa"', '"tdoa"'), ("c = { position_m = [20, 20] }\n", "")], "cannot determine 2 coordinates"),
+    ],
+)  # fmt: skip
+def test_too_few_measurements_are_noted_where_there_is_a_prior(pairs, what):
+    notes = read_text(changed(*pairs)).notes
+    assert any("no Cramér-Rao bound" in note and what in note for note in notes)
+
+
+@pytest.mark.parametrize(
     ("pairs", "words"),
     [
         ([(BOX, "")], ["area is empty", "outline_m", "radius_m"]),
@@ -140,12 +156,11 @@ BOX = "low_m = [0, 0]\nhigh_m = [40, 20]"
         ([('"toa"', '"time"')], ["links.measure", "time"]),
         ([('measure = "toa"', "")], ["no measure"]),
         ([("los = { std_m = 2 }", "")], ["no los"]),
-        ([("b = { position_m = [40, 0] }\nc = { position_m = [20, 20] }\n", "")], ["cannot determine", "Add anchors"]),
         (
-            [("[area]", 'clock = "unknown"\n[area]'), ("c = { position_m = [20, 20] }\n", "")],
-            ["cannot determine 2 coordinates and a clock"],
+            [("= [0, 0] }", "= [0, 0, 4] }"), ("b = { position_m = [40, 0] }\nc = { position_m = [20, 20] }\n", ""),
+             ("high_m = [40, 20]", "high_m = [40, 20]\nheight_m = 1.5")],
+            ["cannot determine 3 coordinates", "Add anchors"],
         ),
-        ([('"toa"', '"tdoa"'), ("c = { position_m = [20, 20] }\n", "")], ["cannot determine 2 coordinates"]),
         ([('"toa"', '"tdoa"\nreference = "d"')], ["links.reference", "d", "Known: a, b, c"]),
         ([('"toa"', '"tdoa"'), ("[area]", 'clock = "unknown"\n[area]')], ["unknown clock", "Remove clock"]),
         ([("[20, 20] }", "[20, 20, 3] }")], ["2 and 3 coordinates"]),

@@ -192,7 +192,9 @@ def _build(file: PlanFile, folder: Path) -> PlanMap:
     plan, left_out, notes = _measured(file, positions)
     plan = plan.replace(title=file.title, prior=prior, area=None)
     few = plan.too_few()
-    if few:
+    if few and prior is not None:
+        notes = (*notes, f"no Cramér-Rao bound: {few}; the numbers over the prior rest on it")
+    elif few:
         raise InputError(
             f"{few}: there are {plan.size} measured numbers of {len(positions) - len(left_out)} anchors",
             "Add anchors or measurements" + (", or give NLOS links a noise (nlos)" if left_out else ""),

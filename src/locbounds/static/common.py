@@ -34,6 +34,15 @@ def verdict_of(id: str, plan: Plan, conditions: tuple[str, ...] = ()) -> Verdict
     return found
 
 
+def check_clock(plan: Plan) -> None:
+    """Raise a RefusedError if an unknown clock adds to channels whose noise is not Gaussian."""
+    if plan.clock_std_m is not None and np.any(plan.clocked & ~np.asarray(plan.gaussian)):
+        raise RefusedError(
+            "a clock offset is common to channels whose noise is not Gaussian",
+            "Use lb.crlb, which takes that, or Gaussian noise, or a known clock",
+        )
+
+
 def check_rtol(rtol: Any) -> float:
     """Raise an InputError unless a precision can be asked for."""
     if not (isinstance(rtol, int | float | np.number) and 0 < float(rtol) <= MOST_RTOL):

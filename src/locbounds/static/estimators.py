@@ -11,7 +11,7 @@ from locbounds.blocks import check_seed
 from locbounds.plan import Plan
 from locbounds.precision import double_precision
 from locbounds.result import Result
-from locbounds.static.common import static_result, verdict_of
+from locbounds.static.common import check_clock, static_result, verdict_of
 from locbounds.static.likelihood import Likelihood, likelihood
 from locbounds.static.mmse import REPLICATES, Drawn, draw, nodes_of, over_replicates, posterior, power
 from locbounds.static.plan_laws import needs_prior
@@ -52,6 +52,7 @@ def ml(plan: Plan, *, draws: int = DRAWS, seed: int = 0) -> Result:
     True
     """
     prior = needs_prior(plan, "an average over positions")
+    check_clock(plan)
     verdict, law = verdict_of("ml", plan), likelihood(plan)
     drawn = draw(plan, law, power(draws), REPLICATES, check_seed(seed))
     nodes = nodes_of(plan, law, NODES)
@@ -89,6 +90,7 @@ def ls(plan: Plan, *, draws: int = DRAWS, seed: int = 0) -> Result:
     True
     """
     prior = needs_prior(plan, "an average over positions")
+    check_clock(plan)
     verdict, law = verdict_of("ls", plan), likelihood(plan)
     drawn = draw(plan, law, power(draws), REPLICATES, check_seed(seed))
     low, high = (np.asarray(x) for x in prior.bounds())

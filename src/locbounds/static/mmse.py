@@ -7,6 +7,7 @@ square error, with less noise than that of the squared errors.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from locbounds.errors import InputError
 from locbounds.plan import Plan
 from locbounds.precision import double_precision
 from locbounds.result import Result
-from locbounds.static.common import check_rtol, not_refined, static_result, verdict_of
+from locbounds.static.common import check_clock, check_rtol, not_refined, static_result, verdict_of
 from locbounds.static.draws import places, sobol
 from locbounds.static.likelihood import SMALL, Likelihood, likelihood
 from locbounds.static.plan_laws import needs_prior
@@ -27,6 +28,8 @@ RUNS = 128  # per replicate at first
 MOST_RUNS = 2048
 TRIAL = 256  # draws on which the nodes are chosen
 NODES, MOST_NODES = 16, 420  # along a line
+MOST_WITH_LIMITS = 1500  # where noise has limits, so that few nodes are possible for a draw, but those must be fine
+MOST_PLACES = 2**21  # nodes altogether: in three dimensions the memory ends first
 TABLE = 2**22  # numbers in one table of likelihoods
 FACE = 24  # draws that share the nodes which matter to any of them
 
@@ -92,24 +95,21 @@ def nodes_of(plan: Plan, law: Likelihood, n: int) -> Nodes:
 def posterior(law: Likelihood, nodes: Nodes, drawn: Drawn) -> Posterior:
     """Posterior of every draw; draws that are close together share the nodes that matter to them.
 
-    Where no node is possible (noise with an edge), the posterior is the prior: finer nodes are needed.
+    Where no node is possible (noise with limits), the posterior is even over the nodes that miss the limits least.
     """
     order = _neighbours_together(drawn.places)
     count, space = drawn.places.shape
     mean, likeliest = np.empty((2, count, space))
     covariance = np.empty((count, space, space))
-    step = int(np.clip(TABLE // len(nodes.points), 1, FACE))
-    for start in range(0, count, step):
-        part = order[start : start + step]
+    limits = noise_limits(law)
+    for part, at in _blocks(law, limits, nodes, drawn, order):
         z = (drawn.measured[0][part], drawn.measured[1][part])
-        near = _relevant(law, nodes, z)
-        at = nodes if near is None else nodes.only(near)
         log = law.log(z, at.features)
         likeliest[part] = at.points[log.argmax(1)]
         log += at.log_weights
         top = log.max(1, keepdims=True)
-        log = np.where(np.isfinite(top), log - np.where(np.isfinite(top), top, 0.0), at.log_weights)  # else: the prior
-        weight = np.exp(log)
+        missed = part[~np.isfinite(top[:, 0])]
+        weight = np.exp(np.where(np.isfinite(top), log - np.where(np.isfinite(top), top, 0.0), 0.0))
         weight /= weight.sum(1, keepdims=True)
         middle = at.points.mean(0)
         x = at.points - middle
@@ -117,6 +117,10 @@ def posterior(law: Likelihood, nodes: Nodes, drawn: Drawn) -> Posterior:
         square = weight @ (x[:, :, None] * x[:, None, :]).reshape(len(x), -1)
         covariance[part] = square.reshape(-1, space, space) - mean[part][:, :, None] * mean[part][:, None, :]
         mean[part] += middle
+        for one in missed:
+            points = nodes.points[_least_missed(limits, nodes, drawn.measured[1][one], 2**space)]
+            mean[one], likeliest[one] = points.mean(0), points[0]
+            covariance[one] = np.cov(points.T, bias=True).reshape(space, space)
     return Posterior(mean, covariance, likeliest)
 
 
@@ -129,6 +133,69 @@ def _neighbours_together(points: ndarray) -> ndarray:
         for axis in range(points.shape[1]):
             code |= ((cell[:, axis] >> bit) & 1) << (bit * points.shape[1] + axis)
     return np.argsort(code, kind="stable")
+
+
+def _blocks(
+    law: Likelihood, limits: ndarray, nodes: Nodes, drawn: Drawn, order: ndarray
+) -> Iterator[tuple[ndarray, Nodes]]:
+    """Draws that share nodes, few enough for one table of likelihoods, with the nodes that matter to them."""
+    shared = np.any(np.isfinite(limits)) or law.angles is not None
+    step = FACE if shared else int(np.clip(TABLE // len(nodes.points), 1, FACE))
+    for start in range(0, len(order), step):
+        part = order[start : start + step]
+        z = (drawn.measured[0][part], drawn.measured[1][part])
+        near = _possible(limits, nodes, z[1])
+        if near is None:
+            near = _relevant(law, nodes, z)
+        at = nodes if near is None else nodes.only(near)
+        few = max(1, TABLE // len(at.points))
+        for first in range(0, len(part), few):
+            yield part[first : first + few], at
+
+
+def noise_limits(law: Likelihood) -> Float[ndarray, "channels 2"]:
+    """Least and largest noise of the channels outside the Gaussian part, infinite where there is none.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> from locbounds.static.likelihood import likelihood
+    >>> stations = [[0, 15], [-13, -7.5], [13, -7.5]]
+    >>> noises = [lb.Gaussian(0, 1), lb.Uniform(-1, 2), lb.Exponential(3.0)]
+    >>> noise_limits(likelihood(lb.toa(stations, noises))).tolist()
+    [[-1.0, 2.0], [0.0, inf]]
+    """
+    out = np.tile([-np.inf, np.inf], (len(law.noises), 1))
+    for k, (_, noise, periodic) in enumerate(law.noises):
+        if periodic:
+            continue
+        places = np.asarray(double_precision(lambda noise=noise: noise.landmarks())())
+        ends, beyond = places[[0, -1]], np.ptp(places) * np.array([-1e-3, -1.0])
+        for side, sign in enumerate((1, -1)):
+            if np.all(np.isneginf(np.asarray(double_precision(noise.log_prob)(ends[side] + sign * beyond)))):
+                out[k, side] = ends[side]
+    return out
+
+
+def _possible(limits: ndarray, nodes: Nodes, z: ndarray) -> ndarray | None:
+    """Nodes that are possible for any of the draws; None if nothing is gained, or none is."""
+    keep = None
+    for k, (low, high) in enumerate(limits):
+        if np.isinf(low) and np.isinf(high):
+            continue
+        slack = 1e-3 * (high - low) if np.isfinite(high - low) else 1e-3 * np.ptp(z[:, k]) + 1e-6
+        here = nodes.features[1][:, k] if keep is None else nodes.features[1][keep, k]
+        good = (here >= z[:, k].min() - high - slack) & (here <= z[:, k].max() - low + slack)
+        keep = np.flatnonzero(good) if keep is None else keep[good]
+    return None if keep is None or not len(keep) else keep
+
+
+def _least_missed(limits: ndarray, nodes: Nodes, z: ndarray, count: int) -> ndarray:
+    """The nodes from which the measurements of a draw are least outside the limits of the noise, the best one first."""
+    gap = z - nodes.features[1]
+    outside = np.maximum(limits[:, 0] - gap, gap - limits[:, 1]).max(1, initial=0.0)
+    few = np.argpartition(outside, min(count, len(outside)) - 1)[:count]
+    return few[np.argsort(outside[few])]
 
 
 def _relevant(law: Likelihood, nodes: Nodes, z: tuple[ndarray, ...]) -> ndarray | None:
@@ -162,6 +229,7 @@ def choose_nodes(plan: Plan, law: Likelihood, drawn: Drawn, rtol: float) -> tupl
     """Nodes so fine that the least RMSE over some draws no longer changes, and how much it changed at last."""
     some = _some(drawn, TRIAL)
     n, before = NODES, None
+    most = MOST_WITH_LIMITS if np.any(np.isfinite(noise_limits(law))) else MOST_NODES
     while True:
         nodes = nodes_of(plan, law, n)
         value = float(np.sqrt(np.trace(posterior(law, nodes, some).covariance, axis1=1, axis2=2).mean()))
@@ -169,7 +237,7 @@ def choose_nodes(plan: Plan, law: Likelihood, drawn: Drawn, rtol: float) -> tupl
             change = abs(value / before - 1) if before > 0 else np.inf
             if change <= rtol:
                 return nodes, change
-            if n >= MOST_NODES:
+            if n >= most or len(nodes.points) * 1.5**plan.dim > MOST_PLACES:
                 return nodes, change
         n, before = n + n // 2 - (n // 2) % 2, value
 
@@ -243,6 +311,7 @@ def mmse(plan: Plan, *, rtol: float = 2e-3, draws: int | None = None, seed: int 
     (True, True)
     """
     needs_prior(plan, "an average over positions")
+    check_clock(plan)
     verdict, rtol = verdict_of("mmse", plan), check_rtol(rtol)
     law, seed = likelihood(plan), check_seed(seed)
     nodes = None

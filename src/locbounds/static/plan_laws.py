@@ -10,7 +10,7 @@ import numpy as np
 from locbounds.axes import Array, Float, ndarray
 from locbounds.errors import InputError
 from locbounds.plan import Plan
-from locbounds.priors import GaussianPrior, PositionPrior, PriorMixture, UniformBox, UniformDisc, UniformPolygon
+from locbounds.priors import GaussianPrior, PositionPrior, PriorMixture, Prism, UniformBox, UniformDisc, UniformPolygon
 from locbounds.static import support as supports
 from locbounds.static.overlap import polygon_overlap, shared_nodes
 from locbounds.static.pair_laws import GaussianPairs, PairLaw, Tabulated
@@ -121,6 +121,11 @@ def support_of(prior: PositionPrior, marks: Array | None = None) -> Support:
             False,
             covariance,
         )
+
+    if isinstance(prior, Prism):
+        low, high = float(prior.low), float(prior.high)
+        between = marks[(marks[:, 2] >= low) & (marks[:, 2] <= high)] if marks.shape[1] == 3 else supports.NO_MARKS
+        return supports.prism(support_of(prior.base, between[:, :2]), low, high)
 
     log_density = _log_density(prior)
 

@@ -15,7 +15,10 @@ from locbounds.static.overlap import (
     Rule,
     box_overlap,
     disc_overlap,
+    distinct,
+    empty,
     gaussian_overlap,
+    legendre,
 )
 
 REACH = 16.0  # deviations: two Gaussians so far apart have exp(-32) in common
@@ -136,6 +139,40 @@ def box(low: Any, high: Any, marks: ndarray = NO_MARKS) -> Support:
         True,
         False,
         np.diag((high - low) ** 2 / 12),
+    )
+
+
+def prism(base: Support, low: float, high: float) -> Support:
+    """A law of the plane with heights that are independent of it, uniform between two."""
+
+    def overlap(shifts: ndarray, n: int, rough: ndarray | None = None) -> Rule:
+        shifts = np.asarray(shifts, float)
+        bottom, top = low - shifts[:, 2].min(), high - shifts[:, 2].max()
+        if top <= bottom:
+            return empty(3)
+        flat = base.overlap(
+            distinct(shifts[:, :2]), n, None if rough is None else distinct(np.asarray(rough, float)[:, :2])
+        )
+        t, w = legendre(n)
+        z, w = bottom + (top - bottom) * t, (top - bottom) * w
+        points = np.column_stack([np.repeat(flat.points, n, axis=0), np.tile(z, len(flat.points))])
+        return Rule(points, np.outer(flat.weights, w).ravel())
+
+    def reach(a: ndarray) -> float:
+        flat, up = float(np.linalg.norm(a[:2])), abs(float(a[2]))
+        longest = base.reach(a[:2] / flat) / flat if flat > 0 else np.inf
+        return min(longest, (high - low) / up) if up > 0 else longest
+
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2], covariance[2, 2] = base.covariance, (high - low) ** 2 / 12
+    return Support(
+        3,
+        lambda points: base.log_density(points[:, :2]) - np.log(high - low),
+        overlap,
+        reach,
+        base.uniform,
+        False,
+        covariance,
     )
 
 
