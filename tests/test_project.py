@@ -44,6 +44,12 @@ def test_import_is_light_and_leaves_the_users_precision_alone():
     assert python(precision) == "False float32"
 
 
+def test_every_public_name_is_there_in_a_fresh_process():
+    program = "import locbounds as lb; print([n for n in lb.__all__ if getattr(lb, n) is None])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.stdout.strip(), done.stderr) == ("[]", "")
+
+
 def test_every_public_docstring_has_an_example():
     import locbounds
 

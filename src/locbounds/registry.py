@@ -430,6 +430,34 @@ def load(entry: Method) -> Any:
     return getattr(importlib.import_module(module), name)
 
 
+REMEDIES = {
+    "plan": "Give a plan file (locbounds new plan.toml --like plan makes one); numbers: locbounds map PLAN.toml",
+    "scenario": "Give a scenario file (locbounds new scenario.toml makes one)",
+    "survey": "Run locbounds survey",
+    "model": "Call it from Python on a JumpMarkov model",
+}
+"""What to do with a method, by what it speaks of."""
+
+
+def check_subject(entry: Method, subject: Any) -> None:
+    """Raise an InputError if a method speaks of something else than the scenario or plan that is given.
+
+    >>> import locbounds as lb
+    >>> check_subject(method("crlb"), lb.papers.fritsche2013.scenario())
+    Traceback (most recent call last):
+    ...
+    locbounds.errors.InputError: crlb speaks of a plan, not of a scenario. Give a plan file ...
+    """
+    given = _kind(subject)
+    if given in (None, entry.subject) or (given == "plan" and entry.on_plan):
+        return
+    raise InputError(f"{entry.id} speaks of a {entry.subject}, not of a {given}", REMEDIES[entry.subject])
+
+
+def _kind(subject: Any) -> str | None:
+    return "plan" if isinstance(subject, Plan) else "scenario" if isinstance(subject, Scenario) else None
+
+
 def describe(entry: Method) -> dict[str, Any]:
     """What a method is, sees and assumes, when it fails and whom to cite, as plain data.
 
@@ -457,12 +485,12 @@ def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
     id
         Id of a method, for example ``bcrb``, or the topic ``regularity``.
     scenario
-        If given, every assumption is checked for it, and the verdict added.
+        If given, every assumption is checked for it, and the verdict added; a plan for methods that speak of plans.
 
     Raises
     ------
     InputError
-        If the id is unknown; the nearest known one is named.
+        If the id is unknown (the nearest known one is named), or the method speaks of something else.
 
     Examples
     --------
@@ -474,6 +502,7 @@ def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
     """
     if id in TOPICS:
         return TOPICS[id]
+    check_subject(method(id), scenario)
     entry = describe(method(id))
     article = "an" if entry["kind"][0] in "aeiou" else "a"
     lines = [f"{entry['name']} ({entry['id']}), {article} {entry['kind']}", entry["summary"], ""]
@@ -481,7 +510,7 @@ def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
     lines += [f"assumes  of a plan (one position): {text}" for text in entry["on_plan"]]
     lines += [f"careful  {entry['fails']}", f"cite     {', '.join(entry['cite'])}"]
     if scenario is not None:
-        lines += ["", f"for      {scenario.title or 'this scenario'}"]
+        lines += ["", f"for      {scenario.title or f'this {_kind(scenario)}'}"]
         checks = method(id).check(scenario)
         lines += [f"violated {text}: {why}" if why else f"holds    {text}" for text, why in checks]
         lines += [f"verdict  {method(id).verdict(scenario)}"]

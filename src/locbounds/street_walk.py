@@ -60,12 +60,14 @@ class Walk(NamedTuple):
         position_std_m: float = 20.0,
         velocity_std_m_s: float = 1.0,
         levels: int = 1,
-        title: str = "Walk through a city",
+        title: str = "Random tracks with the sights of a walk through a city",
     ) -> Scenario:
         """The scenario of a mobile whose links are blocked as on this walk, for trackers and their bounds.
 
         Per anchor the sight is known at every step. In NLOS the range has a mean error, the excess of the path; where
-        the excess varies, the variance that is left is added to that of the noise.
+        the excess varies, the variance that is left is added to that of the noise. Prior and motion know no streets:
+        bounds and filters average over random tracks with that schedule of sights, unless
+        :class:`~locbounds.AlongTrack` of these positions says otherwise.
 
         Parameters
         ----------

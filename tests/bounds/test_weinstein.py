@@ -260,3 +260,43 @@ def test_tables_of_coefficients_agree_with_quadrature_and_with_closed_forms():
     apart = lb.Mixture([0.5, 0.5], [lb.Uniform(0.0, 1.0), lb.Uniform(100.0, 101.0)])
     with pytest.raises(lb.RefusedError, match="far apart"):
         log_coefficient(apart)
+
+
+def test_channels_that_share_a_chain_tell_each_other_its_modes():
+    """One of two channels reveals modes that are drawn afresh: the least error is that of the known modes."""
+    ones = np.ones((2, 1, 1))
+    model = lb.JumpMarkov(
+        times=lb.Times.uniform(step_s=1.0, steps=2),
+        prior=lb.GaussianPrior([0.0], [[4.0]]),
+        motion=lb.LinearMotion(ones, 0.25 * ones, position_index=(0,)),
+        channels=(
+            lb.AdditiveChannel(lambda x, m, k: x[0], [lb.Gaussian(-0.5, 0.5), lb.Gaussian(0.5, 0.5)]),
+            lb.AdditiveChannel(lambda x, m, k: 1e-3 * x[0], [lb.Gaussian(-1.0, 0.05), lb.Gaussian(1.0, 0.05)]),
+        ),
+        chains=lb.MarkovSight([0.5, 0.5], [[0.5, 0.5], [0.5, 0.5]]),
+    )
+    found, least = lb.wwb_recursive(model), [4.0]
+    for _ in range(2):
+        least.append(1 / (1 / (least[-1] + 0.25) + 1 / 0.25 + 1e-6 / 0.05**2))
+    assert "told" in str(found.verdict)
+    np.testing.assert_allclose(found.position_mse, least, rtol=1e-4)
+
+
+def test_noise_without_a_variance_has_a_bound():
+    """Cauchy noise: above the Cramer-Rao bound, below the least error by quadrature."""
+    ones = np.ones((1, 1, 1))
+    model = lb.JumpMarkov(
+        times=lb.Times.uniform(step_s=1.0, steps=1),
+        prior=lb.GaussianPrior([0.0], [[4.0]]),
+        motion=lb.LinearMotion(ones, 0.25 * ones, position_index=(0,)),
+        channels=lb.AdditiveChannel(lambda x, m, k: x[0], [lb.StudentT(1.0, 0.0, 1.0)]),
+        chains=lb.MarkovSight([1.0], [[1.0]]),
+    )
+    x, t = np.linspace(-14, 14, 701), np.linspace(-9, 9, 2001)
+    z, prior = np.sinh(t), np.exp(-(x**2) / (2 * 4.25))
+    joint = prior / prior.sum() / (np.pi * (1 + (z[:, None] - x) ** 2))
+    density = joint.sum(1)
+    variance = joint @ x**2 / density - (joint @ x / density) ** 2
+    least = np.trapezoid(density * variance * np.cosh(t), t)
+    value = float(lb.wwb_recursive(model).position_mse[1])
+    assert 1 / (1 / 4.25 + 1 / 2) < value < least  # the information of Cauchy noise is one half

@@ -54,3 +54,9 @@ def test_wrong_options_are_errors_with_a_remedy(arguments):
 
 def test_no_arguments_show_the_help():
     assert "Usage: locbounds" in CliRunner().invoke(app, []).output
+
+
+def test_help_keeps_the_names_of_sections():
+    text = " ".join(CliRunner().invoke(app, ["map", "--help"], env={"COLUMNS": "200"}).stdout.split())
+    assert "a section [city] that names the footprints" in text
+    assert "\\" not in text

@@ -47,6 +47,12 @@ def test_new_writes_the_papers_scenario(tmp_path):
 
 def test_new_names_the_nearest_paper(tmp_path):
     refused(run("new", "s.toml", "--like", "fritsch"), "unknown paper 'fritsch'", "Did you mean fritsche2013?")
+    refused(run("new", "s.toml", "--like", "plna"), "unknown paper 'plna'", "Did you mean plan?")
+    assert files(tmp_path) == []
+
+
+def test_figures_are_for_one_paper(tmp_path):
+    refused(run("paper", "chen2010", "--figures", "fig1"), "--figures is for mcguire2009, this is chen2010")
     assert files(tmp_path) == []
 
 

@@ -116,6 +116,22 @@ def test_no_crlb_at_sight_boundaries():
     assert "refused at 1 of 2 street points (50%)" in found.verdict
 
 
+def test_status_and_verdict_per_measure():
+    """On the line through all anchors, beyond them: differences tell nothing, times the distance only."""
+    places, points = [[0.0, 0.0], [10.0, 0.0], [20.0, 0.0]], [[25.0, 0.0], [25.0, 9.0], [-9.0, 4.0], [35.0, 35.0]]
+    found = street_map(City([shapely.box(30, 30, 40, 40)]), places, points, std_m=1.0, within_m=0.01)
+    assert found.status_of("toa") == found.status_of("tdoa") == ["singular", "", "", "building"]
+    assert "infinite for toa at 1 (33%)" in found.verdict
+    corner = City([shapely.box(0, 0, 10, 10), shapely.box(0, 12, 10, 30)])
+    places = [[-5.0, -20.0], [-6.0, -20.0], [20.0, 5.0]]  # two of them around one corner
+    found = street_map(corner, places, [[9.0, 40.0]], std_m=1.0, within_m=0.01)
+    told = [np.isfinite(found.rmse_m[m][0]) for m in ("toa", "tdoa")]
+    assert told == [True, False]
+    assert (found.status_of("toa"), found.status_of("tdoa"), found.status) == ([""], ["singular"], [""])
+    assert "infinite for tdoa at 1 (100%)" in found.verdict
+    assert "infinite for toa" not in found.verdict
+
+
 @pytest.mark.parametrize("measure", ["toa", "tdoa"])
 def test_a_table_of_links_is_as_good_as_the_geometry(measure):
     region, anchors = shapely.box(0, 0, 40, 8), np.array([[-10.0, 4.0], [20.0, 30.0], [60.0, -20.0]])
@@ -201,6 +217,7 @@ def test_the_program(files):
     assert "refused at" in done.output
     written = sorted(p.name for p in (files / "out").glob("*.*") if not p.name.startswith("."))
     assert written == ["cells.csv", "excess.png", "map.csv", "sight.png", "tdoa.png", "toa.png"]
+    assert (files / "out" / "map.csv").read_text().startswith("x_m,y_m,status_toa,status_tdoa,anchors,")
     header, *rows = (files / "out" / "cells.csv").read_text().splitlines()
     assert header.startswith("anchors,share,measure,wwb_m,ezzb_m,tightest_m,mmse_m")
     cells = [row.split(",") for row in rows]
@@ -214,6 +231,12 @@ def test_the_program(files):
     [
         ("d = { position_m = [15, 15], roof = true }", "d = { position_m = [15, 15] }", "inside building 0", "roof"),
         ("std_m = 3", "std_db = 3", "unknown key measure.std_db", "std_m"),
+        (
+            '["toa", "tdoa"]',
+            '["toa", "aoa"]',
+            "measure.kinds.1 is 'aoa', but must be 'toa' or 'tdoa'",
+            "times of arrival",
+        ),
         ("std_m = 3", "std_m = -3", "measure.std_m", "standard deviation"),
         ('buildings = "blocks.geojson"', "", "neither buildings nor links_csv", "buildings.geojson"),
         ("[measure]", 'links_csv = "links.csv"\n[measure]', "has buildings and links_csv", "one of them"),
@@ -221,7 +244,18 @@ def test_the_program(files):
         ("blocks.geojson", "absent.geojson", "absent.geojson", "GeoJSON"),
         ("area_m = [-10, -10, 80, 80]", "area_m = [1, 1, 29, 29]", "no street is left", "area"),
         ("area_m = [-10, -10, 80, 80]", "area_m = [9, 9, 2, 2]", "area_m = [9", "four numbers"),
-        ("std_m = 3", "std_m = 3\nnearest = 9", "9 nearest of 4 anchors", "Give fewer"),
+        (
+            "std_m = 3",
+            "std_m = 3\nnearest = 9",
+            "city.toml: measure.nearest is 9, and there are 4 anchors",
+            "from 2 to 4",
+        ),
+        (
+            "std_m = 3",
+            "std_m = 3\nnearest = 1",
+            "measure.nearest is 1, and there are 4 anchors: a difference needs 2",
+            "from 2",
+        ),
         ("area_m = [-10, -10, 80, 80]", "area_m = [-10, -10, 80, 80]\nmargin_m = 60", "no street is left", "margin"),
     ],
 )
@@ -245,15 +279,15 @@ def test_a_cell_that_no_anchor_reaches_is_left_out():
 def test_bad_input_ends_with_two_and_leaves_nothing(files):
     done = run(files, TEXT.replace("std_m = 3", "std_m = 3\nnearest = 9"))
     assert done.exit_code == 2
-    assert "error: the 9 nearest of 4 anchors are wanted" in done.output
-    assert "remedy: Give fewer" in done.output
+    assert "error: city.toml: measure.nearest is 9, and there are 4 anchors" in done.output
+    assert "remedy: Add anchors, or give measure.nearest a number from 2 to 4" in done.output
     done = run(files, TEXT, "--grid", "50")
     assert done.exit_code == 2
     assert "error: --grid is for plan files" in done.output
     assert not (files / "out").exists()
 
 
-def test_courtyards_out_of_reach(files):
+def test_courtyards_out_of_reach(files, capsys):
     from locbounds.cli.map_city import map_city
 
     yard = [[[0, 0], [30, 0], [30, 30], [0, 30], [0, 0]], [[5, 5], [5, 25], [25, 25], [25, 5], [5, 5]]]
@@ -273,6 +307,7 @@ def test_courtyards_out_of_reach(files):
     (files / "city.toml").write_text(outside)
     map_city(files / "city.toml", files / "out")
     assert "unreached" in (files / "out" / "map.csv").read_text()  # in the yard
+    assert "more points that an anchor in use does not reach" in capsys.readouterr().out
 
 
 def test_the_program_with_a_table_of_links(files):

@@ -1,7 +1,7 @@
 """``locbounds explain``: what a method assumes, when it fails, whom to cite."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,11 +14,12 @@ def explain(
         str | None, typer.Argument(metavar="[ID]", help="A bound or filter, or regularity; left out: the list of all.")
     ] = None,
     scenario: Annotated[
-        Path | None, typer.Option("--scenario", metavar="SCENARIO.toml", help="Check every assumption for it.")
+        Path | None,
+        typer.Option("--scenario", metavar="FILE.toml", help="Check every assumption for a scenario, or plan, file."),
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Say what a bound or filter assumes, when it fails and whom to cite; with a scenario, what holds there.
+    """Say what a bound or filter assumes, when it fails, whom to cite; with a scenario or plan file, what holds there.
 
     Example: locbounds explain bcrb --scenario scenario.toml
     """
@@ -27,16 +28,15 @@ def explain(
 
     model = None
     if scenario is not None:
-        from locbounds.io.scenario_file import load
-
         if id is None:
             raise InputError("a scenario was given, but no method", "Name one: locbounds explain bcrb --scenario FILE")
-        model = load(scenario)
+        model = _read(scenario)
     if id in registry.TOPICS:
         return print_json({"id": id, "text": registry.explain(id)}) if json else typer.echo(registry.explain(id))
     entries = [registry.describe(m) for m in (registry.METHODS.values() if id is None else [registry.method(id)])]
     if json:
         if model is not None and id is not None:
+            registry.check_subject(registry.method(id), model)
             checks = [{"assumption": text, "violated": why} for text, why in registry.method(id).check(model)]
             entries[0] |= {"checks": checks, "verdict": str(registry.method(id).verdict(model))}
         print_json(entries if id is None else entries[0])
@@ -46,3 +46,16 @@ def explain(
         typer.echo("More about one: locbounds explain ID; when bounds exist at all: locbounds explain regularity")
     else:
         typer.echo(registry.explain(id, model))
+
+
+def _read(path: Path) -> Any:
+    """The scenario of a scenario file, or the plan of a plan file."""
+    from locbounds.io.kinds import kind_of_file
+
+    if kind_of_file(path) == "plan":
+        from locbounds.io.plans import read_plan
+
+        return read_plan(path).plan
+    from locbounds.io.scenario_file import load
+
+    return load(path)

@@ -45,15 +45,15 @@ def map_command(
     same for a device known to be in one cell), map.png and cells.png. An example to edit: locbounds new plan.toml
     --like plan.
 
-    A city file, with a section \\[city] that names the footprints of buildings, says everything itself: of the options
-    above it takes --out, --seed, --json and --force. Writes map.csv (every street point), cells.csv (bounds per set of
+    A city file, with a section \[city] that names the footprints of buildings, says everything itself: of the options
+    it takes --out, --seed, --json and --force. Writes map.csv (every street point), cells.csv (bounds per set of
     nearest anchors), sight.png, excess.png, toa.png or tdoa.png.
 
     [bold]Example[/bold]: locbounds map plan.toml
     """
-    from locbounds.io.city_file import is_city_file
+    from locbounds.io.kinds import kind_of_file
 
-    if is_city_file(plan):
+    if kind_of_file(plan) == "city":
         from locbounds.cli.map_city import map_city
 
         _refuse_plan_options(grid=grid, cells=cells, methods=methods, share=share, weights=weights, rtol=rtol)

@@ -1,5 +1,6 @@
 """``locbounds map`` of a city file: which links are blocked, how long their paths are, what accuracy is possible."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -73,18 +74,15 @@ def map_city(path: Path, out: Path, *, seed: int = 0, json: bool = False, force:
             ),
         }  # fmt: skip
         for kind in kinds:
-            value = found.rmse_m[kind]
-            some = value[np.isfinite(value)]
             pictures[kind] = city_plot.draw_map(
-                city, x, y, value, high=float(np.quantile(some, 0.8)) if some.size else None, **marks,
-                label="Cramér-Rao bound: position RMSE in m; empty: no bound",
-                title=f"{title}, {KINDS[kind]}",
+                city, x, y, found.rmse_m[kind], streets=free, **marks,
+                label="Cramér-Rao bound: position RMSE in m", title=f"{title}, {KINDS[kind]}",
             )  # fmt: skip
         for name, figure in pictures.items():
             folder.write(f"{name}.png", lambda target, figure=figure: figure.savefig(target, dpi=150))
     overall = _overall_rows(cells, kinds)
     if json:
-        counts = {s or "value": found.status.count(s) for s in dict.fromkeys(found.status)}
+        counts = {k: {s or "value": n for s, n in Counter(found.status_of(k)).items()} for k in kinds}
         print_json({"overall": overall, "points": counts, "verdict": found.verdict, "notes": city.notes})
         return
     _print_overall(overall, title, keys.measure.nearest, names)
@@ -137,22 +135,24 @@ def _box(bounds: tuple[float, ...]) -> Any:
 
 
 def _columns(kinds: tuple[str, ...]) -> tuple[str, ...]:
-    return ("x_m", "y_m", "status", "anchors", "sight", "excess_m", *(f"crlb_{k}_m" for k in kinds))
+    status = tuple(f"status_{k}" for k in kinds)
+    return ("x_m", "y_m", *status, "anchors", "sight", "excess_m", *(f"crlb_{k}_m" for k in kinds))
 
 
 def _rows(found: Any, points: Any, kinds: tuple[str, ...]) -> list[tuple[Any, ...]]:
     import math
 
-    names, rows = found.links.names, []
-    for i, status in enumerate(found.status):
-        if status == "building":
+    names, rows, status = found.links.names, [], [found.status_of(k) for k in kinds]
+    for i in range(len(points)):
+        if found.status[i] == "building":
             continue
         used = found.used[i].tolist()
         sight = " ".join({0: "los", 1: "nlos"}.get(int(found.links.sight[i, m]), "none") for m in used)
         excess = " ".join(f"{found.links.excess_m[i, m]:.3f}" for m in used)
         values = [float(found.rmse_m[k][i]) for k in kinds]
         cells = ["" if not math.isfinite(v) else v for v in values]
-        rows.append((*map(float, points[i]), status or "ok", " ".join(names[m] for m in used), sight, excess, *cells))
+        said = [s[i] or "ok" for s in status]
+        rows.append((*map(float, points[i]), *said, " ".join(names[m] for m in used), sight, excess, *cells))
     return rows
 
 

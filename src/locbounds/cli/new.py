@@ -53,7 +53,7 @@ def new(
         typer.echo(f"wrote {path}; next: locbounds map {path}")
         return
     comments = {"": HEADER.format(name=path), "motion": MOTION, "links": LINKS.format()}
-    save(_moving(paper(like).scenario(), motion), path, comments)
+    save(_moving(paper(like, also=("plan",)).scenario(), motion), path, comments)
     typer.echo(f"wrote {path}; next: locbounds check {path}")
 
 

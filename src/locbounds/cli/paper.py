@@ -16,6 +16,7 @@ from locbounds.cli.options import (
 )
 from locbounds.cli.output import output_folder, print_json, print_table, status
 from locbounds.cli.paper_names import paper as find_paper
+from locbounds.errors import InputError
 
 
 def paper(
@@ -68,6 +69,8 @@ def paper(
     [bold]Example[/bold]: locbounds paper fritsche2013 --runs 2000 --out quick-look
     """
     find_paper(name)
+    if figures is not None and name != "mcguire2009":
+        raise InputError(f"--figures is for mcguire2009, this is {name}", "Leave it out: all figures are made")
     wanted = requirements(requirement)
     with output_folder(default_out(name, out), force=force) as folder:
         if name == "chen2010":

@@ -107,16 +107,14 @@ def track(
 
 def applicable_bounds(model: "Scenario", ids: str | None) -> "list[Method]":
     """The bounds that were named, or all that apply."""
-    from locbounds.registry import bounds_of, method
+    from locbounds.registry import REMEDIES, bounds_of, method
     from locbounds.verdict import Status
 
     if ids is not None:
         chosen = [] if ids == "none" else [method(id.strip(), "bound") for id in ids.split(",")]
         for m in chosen:
             if m.subject != "scenario":
-                python = "Call it from Python on a JumpMarkov model"
-                remedy = python if m.subject == "model" else f"Run locbounds {m.subject}"
-                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", remedy)
+                raise InputError(f"{m.id} speaks of a {m.subject}, not of a scenario", REMEDIES[m.subject])
         return chosen
     applicable = [m for m in bounds_of("scenario") if m.verdict(model).status is not Status.REFUSED]
     known = any(m.id == "known-sight" for m in applicable)  # then nothing is left to average over
@@ -169,7 +167,7 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted, ho
             efficient = str(r.efficiency(matching[0])) if matching else ""
             tails = " / ".join(f"{quantile(r, share)[0]:.3g}" for share in (0.67, 0.95))
         number = format_with_error(r.mean_position_rmse(), r.mean_position_rmse_stderr())
-        rows.append([r.id, r.kind, number, efficient, tails, "; ".join([str(r.verdict.status), *r.verdict.reasons])])
+        rows.append([r.id, r.kind, number, efficient, tails, str(r.verdict._replace(warnings=()))])
     if json:
         keys = ("method", "kind", "position_rmse_m", "stderr_m", "verdict")
         values = [

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from pydantic import ValidationError, model_validator
 
 from locbounds.errors import InputError
 from locbounds.io.anchors_csv import read_anchors
-from locbounds.io.complain import quoted, unknown_key_remedy
+from locbounds.io.complain import complain
 from locbounds.io.footprints import read_city
 from locbounds.io.link_table import read_links
 from locbounds.io.schema import Section, key, needed
@@ -96,18 +95,6 @@ class CityFile(NamedTuple):
         return tuple(float(v) for v in bounds)
 
 
-def is_city_file(path: str | os.PathLike) -> bool:
-    """Whether a TOML file has a section ``[city]``; False where it cannot be read.
-
-    >>> is_city_file("absent.toml")
-    False
-    """
-    try:
-        return "city" in tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
-        return False
-
-
 def load_city(path: str | os.PathLike) -> CityFile:
     """Read a city file, its footprints and its anchors.
 
@@ -137,7 +124,7 @@ def load_city(path: str | os.PathLike) -> CityFile:
     try:
         keys = CityFileKeys.model_validate(parse_toml(text, path.name))
     except ValidationError as error:
-        raise _complain(error, path.name) from None
+        raise complain(error, path.name, CityFileKeys) from None
     places = (
         {name: p[:2] for name, p in read_anchors(path.parent / keys.anchors_csv).items()} if keys.anchors_csv else {}
     )
@@ -149,6 +136,15 @@ def load_city(path: str | os.PathLike) -> CityFile:
         places[name] = anchor.position_m
     if not places:
         raise InputError(f"{path.name} has no anchors", "Add [anchors] with a line NAME = { position_m = [x, y] } each")
+    least = 2 if "tdoa" in keys.measure.kinds else 1
+    if not least <= keys.measure.nearest <= len(places):
+        few = len(places) < least
+        raise InputError(
+            f"{path.name}: measure.nearest is {keys.measure.nearest}, and there "
+            + ("is 1 anchor" if len(places) == 1 else f"are {len(places)} anchors")
+            + (": a difference needs 2" if least == 2 and min(keys.measure.nearest, len(places)) < 2 else ""),
+            "Add anchors" if few else f"Add anchors, or give measure.nearest a number from {least} to {len(places)}",
+        )
     roofs = tuple(name for name, anchor in keys.anchors.items() if anchor.roof)
     if keys.city.links_csv is not None:
         return CityFile(keys, None, read_links(path.parent / keys.city.links_csv, places), places, roofs)
@@ -159,23 +155,3 @@ def load_city(path: str | os.PathLike) -> CityFile:
         )
     city = read_city(path.parent / keys.city.buildings, gap_m=keys.city.gap_m)
     return CityFile(keys, city, None, places, roofs)
-
-
-def _complain(error: ValidationError, source: str) -> InputError:
-    first: Any = min(error.errors(include_url=False), key=lambda e: e["type"] != "extra_forbidden")
-    location: tuple[Any, ...] = first["loc"]
-    model: Any = CityFileKeys
-    for part in location[:-1]:
-        inner = {"city": CitySection, "measure": MeasureSection, "anchors": CityAnchor}.get(str(part))
-        model = inner or model
-    where, name = ".".join(map(str, location)), str(location[-1]) if location else ""
-    field = model.model_fields.get(name)
-    teaching = (field.description or "") if field else ""
-    if first["type"] == "extra_forbidden":
-        remedy = unknown_key_remedy(name, list(model.model_fields))
-        return InputError(f"{source}: unknown key {where} = {quoted(first['input'])}", remedy)
-    if first["type"] == "missing":
-        return InputError(f"{source}: {where} is missing", f"Add {name}: {teaching}")
-    if first["type"] == "locbounds":
-        return InputError(f"{source}: {where} {first['ctx']['cause']}", first["ctx"]["remedy"] or teaching)
-    return InputError(f"{source}: {where} is {quoted(first['input'])}: {first['msg']}", f"{name}: {teaching}")

@@ -96,7 +96,9 @@ def _explain(error: Any, root: type[BaseModel]) -> tuple[str, str]:
         return f"{path} is missing", f"Add {remedy}"
     if kind == "locbounds":
         context = error["ctx"]
-        return f"{path} {context['cause']}", context["remedy"] or remedy
+        return f"{path} {context['cause']}".strip(), context["remedy"] or remedy
+    if kind == "literal_error":
+        return f"{path} is {quoted(value)}, but must be {error['ctx']['expected']}", remedy
     if kind in ("model_type", "dict_type", "model_attributes_type"):
         return f"{path} is {quoted(value)}, not a table", remedy or "Write it as { key = value }"
     return f"{path} is {quoted(value)}: {error['msg']}", remedy

@@ -132,7 +132,10 @@ class PlanFile(Section):
     @model_validator(mode="after")
     def _clock(self):
         if self.clock is not None and self.clock_std_m is not None:
-            raise fail("has clock and clock_std_m", "Keep one of them")
+            raise fail("the file has both clock and clock_std_m", "Keep one of them")
         if self.clock_std_m is not None and self.clock_std_m <= 0:
-            raise fail(f"has clock_std_m = {self.clock_std_m}", 'Give a positive number, or clock = "known"')
+            raise fail(
+                f"the file has clock_std_m = {self.clock_std_m}, which is not positive",
+                'Give a positive number, or clock = "known"',
+            )
         return self

@@ -13,6 +13,7 @@ from locbounds.errors import InputError
 from locbounds.io.anchors_csv import anchor_positions
 from locbounds.io.build import at, build_noises
 from locbounds.io.complain import close_key, complain, quoted
+from locbounds.io.kinds import expect
 from locbounds.io.plan_schema import AreaSection, PlanAnchor, PlanFile, PlanLinks, PriorTable, Shape
 from locbounds.io.schema import NlosTable, NoiseTable
 from locbounds.io.toml import parse_toml
@@ -100,6 +101,7 @@ def read_text(text: str, *, folder: str | os.PathLike = ".", source: str = "plan
     Did you mean std_db? The errors of "rss" are in dB
     """
     keys = parse_toml(text, source)
+    expect(keys, "plan", source)
     units: dict[str, str] = {}
     try:
         file = PlanFile.model_validate(_in_metres(keys, units))
@@ -208,6 +210,9 @@ def _region(shape: Shape, path: str) -> PositionPrior:
             for name, rings in (("outline_m", [shape.outline_m]), ("holes_m", shape.holes_m or [])):
                 if any(len(corner) != 2 for ring in rings for corner in ring):
                     raise InputError(f"{name} has corners of three coordinates", "Give [x, y]; heights are height_m")
+            corners = np.asarray(shape.outline_m)
+            if len(corners) > 2 and np.linalg.matrix_rank(corners - corners[0]) < 2:
+                raise InputError("the corners of outline_m lie on one line", "Give corners that enclose an area")
             return UniformPolygon(shape.outline_m, shape.holes_m or ())
         if shape.center_m is not None:
             return UniformDisc(shape.center_m, shape.radius_m)

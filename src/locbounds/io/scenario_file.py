@@ -12,6 +12,7 @@ from locbounds.errors import InputError
 from locbounds.io.build import build
 from locbounds.io.complain import complain
 from locbounds.io.files import atomic_write_text
+from locbounds.io.kinds import expect
 from locbounds.io.schema import ScenarioFile
 from locbounds.io.toml import parse_toml
 from locbounds.io.write import file_keys
@@ -50,6 +51,7 @@ def loads(text: str, *, folder: str | os.PathLike = ".", source: str = "scenario
     Did you mean step_s? Known here: step_s, steps, times_s
     """
     keys = parse_toml(text, source)
+    expect(keys, "scenario", source)
     try:
         file = ScenarioFile.model_validate(_hoisted(keys))
     except ValidationError as error:

@@ -6,6 +6,7 @@ information is finite, growing like ``log 1/h`` next to linear edges and like ``
 of many samples then keep their relative accuracy.
 """
 
+import math
 from typing import Any
 
 import jax
@@ -25,6 +26,7 @@ GROWTH = 1.25  # of the shift, while looking for where the coefficient has becom
 MOST = 1e6  # deviations
 KEPT = 32  # tables
 AT_ONCE = 160  # shifts
+QUARTILES = 1.3489795003921634  # between them lie so many deviations of a normal law
 
 
 @double_precision
@@ -93,7 +95,7 @@ class LogCoefficient:
     Parameters
     ----------
     noise
-        Any noise with a finite variance.
+        Any noise.
 
     Raises
     ------
@@ -109,7 +111,7 @@ class LogCoefficient:
     """
 
     def __init__(self, noise: Noise):
-        unit = float(noise.variance) ** 0.5
+        unit = rough_variance(noise) ** 0.5
         ends = [end for piece in noise.support() for end in piece]
         self.width = max(ends) - min(ends)  # beyond it the copies do not meet
         top = min(self.width, MOST * unit)
@@ -145,3 +147,17 @@ class LogCoefficient:
         below = np.minimum(np.log(np.maximum(h, np.finfo(float).tiny)) - np.log(self.low), 0.0)
         value = -np.exp(self.table(x) + self.slope * below) * h**2
         return np.where(h >= self.width, -np.inf, value)
+
+
+def rough_variance(noise: Noise) -> float:
+    """The variance; where it is infinite, that of the normal law with the same quartiles.
+
+    >>> import locbounds as lb
+    >>> rough_variance(lb.Gaussian(0.0, 3.0)), round(rough_variance(lb.StudentT(1.0, 0.0, 2.0)), 2)
+    (9.0, 8.79)
+    """
+    variance = float(noise.variance)
+    if math.isfinite(variance):
+        return variance
+    low, high = np.asarray(noise.quantile(np.array([0.25, 0.75])))
+    return float((high - low) / QUARTILES) ** 2

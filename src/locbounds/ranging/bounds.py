@@ -11,7 +11,7 @@ from locbounds.bounds.recursion import GivenIncrements, LinearModel
 from locbounds.bounds.weinstein import path_bound
 from locbounds.errors import InputError, RefusedError
 from locbounds.horizon import PREDICT, SMOOTH, Horizon
-from locbounds.noise.log_coefficient import log_coefficient
+from locbounds.noise.log_coefficient import log_coefficient, rough_variance
 from locbounds.precision import double_precision
 from locbounds.ranging.model import DistanceModel
 from locbounds.ranging.sensors import refuse_zero
@@ -195,7 +195,7 @@ def distance_wwb(
     counts = [count for _, count in laws]
     D, _ = model.whitened()
     sensors = len(laws)
-    rough = np.array([c / float(noise.variance) for noise, c in laws])
+    rough = np.array([c / rough_variance(noise) for noise, c in laws])
 
     def log_rho(moved: ndarray) -> ndarray:  # of all sensors at step 1, then at step 2, ...
         total = np.zeros(moved.shape[1:])

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 BUILDING, WALL = "#C9C4BB", "#8A847A"
 MOST_TICKS = 12  # of whole numbers at a colour bar
+LOGARITHMIC = 10.0  # a wider range of values has logarithmic colours
+NO_VALUE = "#DFE3E8"
 FREE, BLOCKED, STREET = "#0072B2", "#D55E00", "#E9F1E6"
 
 
@@ -142,8 +144,13 @@ def draw_map(
     names: Sequence[str] = (),
     title: str = "",
     high: float | None = None,
+    streets: Bool[ndarray, " points"] | None = None,
+    without: str = "no bound",
 ) -> "Figure":
     """A quantity over the streets, as colours with a bar; cells that are not finite stay empty.
+
+    Colours are logarithmic where the values spread over more than a factor of 10, and steps where they are few whole
+    numbers.
 
     Parameters
     ----------
@@ -161,6 +168,10 @@ def draw_map(
         Title of the figure.
     high
         Value at the top of the colour bar; by default the 98 % quantile, so that a few far places do not hide the rest.
+    streets
+        Which cells are streets: those without a finite value are then light grey, and named in a legend.
+    without
+        What the legend calls them.
 
     Examples
     --------
@@ -173,28 +184,49 @@ def draw_map(
     >>> figure.axes[1].get_ylabel()
     'excess delay in m'
     """
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap, LogNorm, Normalize
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+    from matplotlib.ticker import LogLocator
 
     values = np.where(np.isfinite(value), value, np.nan).reshape(len(y), len(x))
     some = values[np.isfinite(values)]
-    values = _under_walls(
-        values, city.inside(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)).reshape(values.shape)
-    )
+    inside = city.inside(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)).reshape(values.shape)
+    empty = np.isnan(values) & ~inside & (False if streets is None else np.asarray(streets).reshape(values.shape))
+    values = _under_walls(values, inside)
     high = high if high is not None else float(np.quantile(some, 0.98)) if some.size else 1.0
     figure = Figure(figsize=(7.6, 6.2), layout="constrained")
     panel = figure.subplots()
     steps = [np.ptp(v) / max(len(v) - 1, 1) or 1.0 for v in (x, y)]
     extent = (x[0] - steps[0] / 2, x[-1] + steps[0] / 2, y[0] - steps[1] / 2, y[-1] + steps[1] / 2)
+    if empty.any():
+        grey = _under_walls(np.where(empty, 1.0, np.nan), inside)
+        panel.imshow(
+            grey, origin="lower", extent=extent, cmap=ListedColormap([NO_VALUE]), interpolation="nearest", zorder=0.5
+        )
+        figure.legend(
+            handles=[Patch(facecolor=NO_VALUE, edgecolor=WALL, lw=0.4, label=without)],
+            loc="outside lower center", frameon=False, fontsize=9,
+        )  # fmt: skip
+    whole = bool(some.size) and not np.any(some % 1) and high <= MOST_TICKS
+    wide = not whole and bool(some.size) and some.min() > 0 and high > LOGARITHMIC * some.min()
     image = panel.imshow(
-        values, origin="lower", extent=extent, cmap="viridis", vmin=0.0, vmax=high or 1.0, interpolation="nearest"
-    )
+        values, origin="lower", extent=extent, interpolation="nearest", zorder=1,
+        cmap=colormaps["viridis"].resampled(int(high) + 1) if whole else "viridis",
+        norm=LogNorm(some.min(), high) if wide
+        else Normalize(-0.5, int(high) + 0.5) if whole
+        else Normalize(0.0, high or 1.0),
+    )  # fmt: skip
     draw_buildings(panel, city, bounds=(extent[0], extent[2], extent[1], extent[3]))
     if anchors is not None:
         draw_anchors(panel, np.asarray(anchors), names or [str(k + 1) for k in range(len(anchors))])
     over = bool(some.size and some.max() > (high or 1.0))
-    whole = bool(some.size) and not np.any(some % 1)
-    ticks = np.arange(int(high) + 1) if whole and high <= MOST_TICKS else None
-    figure.colorbar(image, ax=panel, label=label, extend="max" if over else "neither", shrink=0.9, ticks=ticks)
+    ticks = np.arange(int(high) + 1) if whole else LogLocator(subs=(1.0, 2.0, 5.0)) if wide else None
+    bar = figure.colorbar(image, ax=panel, label=label, extend="max" if over else "neither", shrink=0.9, ticks=ticks)
+    if wide:
+        bar.ax.yaxis.set_major_formatter("{x:g}")
+        bar.ax.yaxis.set_minor_formatter("")
     if title:
         panel.set_title(title, loc="left", fontsize=10)
     return figure

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from locbounds.axes import Float, ndarray
+from locbounds.noise.log_coefficient import rough_variance
 from locbounds.plan import Plan
 from locbounds.precision import double_precision
 from locbounds.static.plan_laws import means
 
 BINS = 2**16  # of a table of the density of an angle on the circle
-TABLE = 2**14  # differences at which the log-density of another noise is tabulated
+TABLE, MOST = 2**14, 2**21  # differences at which the log-density of another noise is tabulated
 NARROW = 0.3  # rad: below it both ways round the circle never meet
 SMALL = 25.0  # log-likelihoods so far below the best one do not count
 
@@ -30,7 +32,7 @@ class Likelihood(NamedTuple):
     noises : tuple
         ``(channel, noise, periodic)`` of the others.
     tables : tuple
-        Log-densities of these: ``(low, 1 / step, values)``.
+        Log-densities of these: ``(low, 1 / step, values)``, or the function itself.
     """
 
     plan: Plan
@@ -107,6 +109,8 @@ def quantile(noise: Any, u: ndarray) -> ndarray:
 
 def look_up(table: Any, periodic: bool, difference: ndarray) -> ndarray:
     """The nearest entry of a table (on the circle for angles); minus infinity where the density vanishes."""
+    if callable(table):
+        return np.asarray(table(difference))
     low, per_step, values = table
     index = np.rint((difference - low) * per_step).astype(np.int64)
     if periodic:
@@ -135,7 +139,7 @@ def likelihood(plan: Plan) -> Likelihood:
     return Likelihood(plan, linear, whitener, others, tuple(_table(noise, round_) for _, noise, round_ in others))
 
 
-def _table(noise: Any, periodic: bool) -> tuple[float, float, ndarray]:
+def _table(noise: Any, periodic: bool) -> Any:
     if periodic:
         w = -np.pi + 2 * np.pi * np.arange(BINS) / BINS
         turns = 2 * np.pi * np.arange(-12, 13)
@@ -146,6 +150,9 @@ def _table(noise: Any, periodic: bool) -> tuple[float, float, ndarray]:
     places = np.asarray(double_precision(lambda: noise.landmarks())())
     low, high = float(places[0]), float(places[-1])
     # fine where the density is: spacing a hundredth of the deviation at most, and all of the span
-    count = int(min(max(TABLE, 100 * (high - low) / float(np.sqrt(noise.variance))), 2**21))
+    fine = 100 * (high - low) / double_precision(rough_variance)(noise) ** 0.5
+    if not fine <= MOST:
+        return double_precision(jax.jit(lambda w: noise.log_prob(w)))  # heavy tails
+    count = int(max(TABLE, fine))
     w = np.linspace(low, high, count)
     return low, (count - 1) / (high - low), np.asarray(double_precision(noise.log_prob)(w))

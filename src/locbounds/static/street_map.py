@@ -94,9 +94,10 @@ class StreetMap(NamedTuple):
     used
         The anchors in use, nearest first, [points, used].
     status
-        ``""`` (a value), ``"boundary"``, ``"building"``, ``"unreached"`` or ``"singular"`` per point.
+        ``""`` (a value), ``"boundary"``, ``"building"``, ``"unreached"`` or ``"singular"`` (for every measure) per
+        point.
     rmse_m
-        Measure -> Cramér-Rao bound, NaN where there is none.
+        Measure -> Cramér-Rao bound, NaN where there is none, infinite where the position is not told.
     """
 
     links: Links
@@ -114,12 +115,34 @@ class StreetMap(NamedTuple):
         """For which points the Cramér-Rao bound holds."""
         free = [s for s in self.status if s not in ("building", "unreached")]
         left_out = free.count("boundary")
-        return (
+        text = (
             "crlb: valid for unbiased estimators and points away from sight boundaries; refused at "
             f"{left_out:,} of {len(free):,} street points ({left_out / max(len(free), 1):.0%}) where sight, last "
-            "corner or the set of nearest anchors changes nearby, so that the law of the ranges has no derivative. "
-            "wwb and ezzb hold there too"
+            "corner or the set of nearest anchors changes nearby, so that the law of the ranges has no derivative"
         )
+        for measure in self.rmse_m:
+            singular = self.status_of(measure).count("singular")
+            if singular:
+                text += (
+                    f"; infinite for {measure} at {singular:,} ({singular / len(free):.0%}), where it does not tell "
+                    "the position"
+                )
+        unreached = self.status.count("unreached")
+        if unreached:
+            text += f"; left out: {unreached:,} more points that an anchor in use does not reach"
+        return f"{text}. wwb and ezzb need no derivative"
+
+    def status_of(self, measure: str) -> list[str]:
+        """Status per point for one measure, which may be singular where another one is not.
+
+        >>> import shapely
+        >>> city, places = City([shapely.box(30, 30, 40, 40)]), [[0.0, 0.0], [10.0, 0.0], [20.0, 0.0]]
+        >>> found = street_map(city, places, [[25.0, 0.0], [25.0, 9.0]], std_m=1.0, within_m=0.01)
+        >>> found.status_of("tdoa")
+        ['singular', '']
+        """
+        singular = np.isinf(self.rmse_m[measure])
+        return ["singular" if s == "" and n else s for s, n in zip(self.status, singular.tolist(), strict=True)]
 
 
 def street_map(

@@ -1,5 +1,6 @@
 """Bhattacharyya coefficients of the measurements of a jump-Markov model with linear channels."""
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ class ModelCoefficients:
     """Independent over the steps, or with chains whose modes the estimator is told.
 
     Where it is told the modes r, they are part of the data and ``rho = E[prod_j rho_{r_j}]`` over the chain's law.
-    Where modes are drawn afresh at every step, the noise is their mixture.
+    Where the modes of a single channel are drawn afresh at every step, its noise is their mixture; channels that share
+    a chain depend on each other, so that one may tell the mode of the other.
 
     Parameters
     ----------
@@ -29,7 +31,12 @@ class ModelCoefficients:
         self.used = sorted({channel.chain for channel in model.channels})
         self.law = {c: _law(model, c) for c in self.used}
         self.transitions = {c: np.asarray(model.transitions(c)) for c in self.used}
-        self.told = {c for c in self.used if _remembers(self.transitions[c], self.law[c])}
+        channels_of = Counter(channel.chain for channel in model.channels)
+        self.told = {
+            c
+            for c in self.used
+            if _remembers(self.transitions[c], self.law[c]) or (channels_of[c] > 1 and self.law[c].shape[1] > 1)
+        }
         self.tables = []
         for channel in model.channels:
             noises: Any = channel.noises  # type: ignore[attr-defined]

@@ -13,6 +13,7 @@ from locbounds.errors import InputError, RefusedError
 from locbounds.horizon import FILTER, PREDICT, SMOOTH, Horizon
 from locbounds.model import JumpMarkov, jump_markov
 from locbounds.model.linear import gradients, matrices, singular_motion
+from locbounds.noise.log_coefficient import rough_variance
 from locbounds.precision import double_precision
 from locbounds.registry import method
 from locbounds.result import Provenance, Result
@@ -43,9 +44,9 @@ def wwb_recursive(
     ----------
     model
         Linear Gaussian motion without modes, Gaussian prior, additive channels whose ``h`` is linear in the state.
-        Where a chain's modes are drawn afresh at every step, its noise is their mixture. Where the chain remembers, the
-        bound is that of estimators which are told its modes, and says so: the coefficients of a chain that nobody is
-        told are integrals over all measurements at once.
+        Where the modes of one channel are drawn afresh at every step, its noise is their mixture. Where the chain
+        remembers, or channels share it, the bound is that of estimators which are told its modes, and says so: the
+        coefficients of a chain that nobody is told are integrals over all measurements at once.
     horizon
         ``"filter"``, ``"predict:N"`` or ``"smooth"``; the last one by moved paths only.
     moved
@@ -206,7 +207,7 @@ def _axes(model: JumpMarkov, F: ndarray, Q: ndarray, P0: ndarray, slopes: ndarra
 
 def _least_variances(model: JumpMarkov) -> Float[ndarray, " channels"]:
     channels: Any = model.channels
-    return np.array([min(float(n.variance) for n in channel.noises) for channel in channels])
+    return np.array([min(rough_variance(n) for n in channel.noises) for channel in channels])
 
 
 def _paths(
