@@ -42,7 +42,7 @@ def jumping_function(plan: Plan) -> str | None:
     jump = black_box_jump(plan)
     if jump is None:
         return None
-    place = ", ".join(f"{x:.4g}" for x in jump.place)
+    place = ", ".join(f"{x:.4g}" for x in np.round(jump.place, 9) + 0.0)
     return f"the function of channel {plan.channel_names[jump.channel]} jumps by {jump.size:.3g} at ({place})"
 
 

@@ -64,7 +64,7 @@ def bcrb_of_plan(plan: Plan, *, rtol: float = 1e-3) -> Result:
     if verdict.status is Status.REFUSED:
         raise RefusedError(
             f"the Bayesian Cramér-Rao bound does not exist here: {'; '.join(verdict.reasons)}",
-            "Weiss-Weinstein and Ziv-Zakai bounds (wwb, ezzb) exist for every prior and measurement",
+            "The Ziv-Zakai bound (ezzb) exists for every prior and measurement, Weiss-Weinstein (wwb) unless one jumps",
         )
     J, change = bayesian_information(plan, rtol=min(rtol, RTOL))
     if change > rtol:

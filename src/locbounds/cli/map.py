@@ -141,7 +141,7 @@ def map_plan(
         folder.write_text("methods.csv", csv_text(map_tables.METHOD_COLUMNS, rows))
         parts = []
         if cells and local:
-            with count_progress("cells") as progress:
+            with count_progress("numbers per cell") as progress:
                 parts = bayes.per_cell(
                     read.plan, read.area, local, cells=cells, height=read.heights_m, rtol=max(rtol, 2 * bayes.RTOL),
                     seed=seed, progress=progress,

@@ -217,18 +217,20 @@ def per_cell(
     rtol, seed
         As for :func:`over_prior`.
     progress
-        Called with (cells done, cells).
+        Called with (numbers done, numbers), one number per cell and method.
     """
     if not 1 <= cells <= MOST_CELLS:
         raise InputError(f"{cells} cells along the longer side", f"Give a number from 1 to {MOST_CELLS}")
     parts = cells_of(area, cells, height)
     out = []
+    progress(0, len(parts) * len(ids))
     for k, (corners, law) in enumerate(parts):
-        found: Numbers
-        try:
-            found = over_prior(plan.replace(prior=law), ids, rtol=rtol, seed=seed)
-        except LocboundsError as error:
-            found = {id: Refusal(id, error.cause) for id in ids}
+        found: Numbers = {}
+        for j, id in enumerate(ids):
+            try:
+                found |= over_prior(plan.replace(prior=law), [id], rtol=rtol, seed=seed)
+            except LocboundsError as error:
+                found[id] = Refusal(id, error.cause)
+            progress(k * len(ids) + j + 1, len(parts) * len(ids))
         out.append(Cell(corners, found))
-        progress(k + 1, len(parts))
     return out
