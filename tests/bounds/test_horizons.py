@@ -106,6 +106,7 @@ def test_linear_gaussian_models_give_kalman_predictor_and_smoother_covariances(h
             np.testing.assert_allclose(bound.covariance[:3], dense(scenario, std)[0][:3], rtol=ROUNDING)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("horizon", "shared"),
     [
@@ -200,6 +201,7 @@ def test_smoothing_is_every_block_of_the_inverse_for_any_increments():
     np.testing.assert_allclose(change, differences, atol=1e-6 * np.abs(differences).max())
 
 
+@pytest.mark.slow
 def test_a_switching_motion_is_smoothed_with_the_matrix_of_an_explicit_sum_over_all_sequences():
     model = switching()
     K = model.steps

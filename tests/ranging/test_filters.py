@@ -72,6 +72,7 @@ def test_particles_of_cut_noise_lie_between_weiss_weinstein_and_the_ekf():
     assert particles.diagnostics["stranded"].shape == (RUNS,)
 
 
+@pytest.mark.slow
 def test_particles_agree_with_a_grid_on_one_signal_strength():
     """One step, cut noise, a curved measurement: the posterior mean on a grid of distances."""
     noise, bias = cut(1.6), cut(3.0)

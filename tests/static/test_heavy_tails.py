@@ -30,9 +30,8 @@ def least_mse(law):
     return total
 
 
-@pytest.mark.parametrize(
-    "name", ["Student t", *(pytest.param(name, marks=pytest.mark.slow) for name in ("Cauchy", "log-normal"))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LAWS)
 def test_bounds_are_below_the_least_error_and_this_agrees_with_sums(name):
     noise, law = LAWS[name]
     plan = lb.observe(lambda p: p[0], [noise], dim=1, prior=lb.UniformBox([0.0], [LENGTH]))
