@@ -57,6 +57,7 @@ def laws(case, sigma):
     return by_hand.wrapped(angles, sigma) if case.kind == "AoA" else by_hand.gaussian(means)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "sigma"), [("TDoA R_BS=5 m", 1.0), ("RSS R_BS=5 m", 8.0), ("AoA R_BS=5 m", 0.8)])
 def test_bounds_of_a_setting_from_sums(name, sigma):
     case = next(c for c in study.CASES if c.name == name)

@@ -55,6 +55,7 @@ def test_the_texts_statements():
     assert found.other_los == pytest.approx(area / 6200, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["ToA", pytest.param("TDoA", marks=pytest.mark.slow)])
 def test_bounds_and_least_error_by_brute_force(case, monkeypatch):
     monkeypatch.setattr(study, "GRID", (6, 4))  # a coarser search finds a bound that is valid too

@@ -37,6 +37,7 @@ AREAS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("area", AREAS)
 @pytest.mark.parametrize("std", [0.7, 3.0])
 def test_both_bounds_on_an_area(area, std):
@@ -93,6 +94,7 @@ def test_least_error_of_a_line():
         assert bound.position_mse[0] < slow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("std", [0.8, 4.0])
 def test_least_error_of_two_ranges(std):
     slow = by_hand.least_error_of_two_ranges(
