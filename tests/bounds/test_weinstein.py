@@ -67,6 +67,33 @@ def test_linear_gaussian_is_the_closed_form_and_tends_to_the_kalman_variance():
                 np.testing.assert_allclose(got[k], kalman, rtol=1e-6)
 
 
+@pytest.mark.parametrize(("ratio", "kept"), [(1e-4, 0.999), (1e-8, 0.99), (1e-12, 0.0), (1e-16, 0.0), (1e-20, 0.0)])
+@pytest.mark.parametrize("n", [1, 2])
+def test_rounding_never_lifts_the_bound_where_the_motion_is_nearly_noiseless(n, ratio, kept):
+    """Differences of blocks are then nothing but rounding; the exact value is the Kalman covariance."""
+    F, Q = np.array([[1.0, 1.0], [0.0, 1.0]])[:n, :n], ratio * np.array([[4 / 3, 2.0], [2.0, 4.0]])[:n, :n]
+    P0, H = np.diag([4.0, 1.0])[:n, :n], np.eye(n)[0]
+    P, exact = P0, [P0]
+    for _ in range(6):
+        P = F @ P @ F.T + Q
+        P = P - np.outer(P @ H, H @ P) / (H @ P @ H + 1.0)
+        exact.append(P)
+    inverse = [np.linalg.inv(S) for S in (P0, *[Q] * 6)]
+    ahead = [F.T @ np.linalg.inv(Q) @ F] * 6 + [0.0]
+    seen = [0.0] + [np.outer(H, H)] * 6
+    alone = np.stack([np.linalg.inv(sum(parts)) for parts in zip(inverse, ahead, seen, strict=True)])
+    axes = np.swapaxes(np.linalg.cholesky(alone), 1, 2)  # each state given all others
+    found = []
+    for size in (0.03, 0.06, 0.12, 0.25, 0.5, 1.0):
+        shifts = (size * np.array([0.6, 1.2, 2.0])[:, None, None] * axes[:, None]).reshape(7, -1, n)
+        got = weiss_weinstein_recursion(np.tile(F, (6, 1, 1)), np.tile(Q, (6, 1, 1)), P0, shifts, Gaussians([H] * 6))
+        found.append(got[:, 0, 0] / np.array(exact)[:, 0, 0])
+    best = np.max(found, 0)
+    assert np.all(best <= 1 + 1e-12)
+    assert np.all(best >= kept)
+    assert best[0] == pytest.approx(1.0, rel=1e-9)  # nothing is subtracted before the first measurement
+
+
 ONE = np.ones((3, 1, 1))
 SURE = lb.MarkovSight([1.0], [[1.0]])
 

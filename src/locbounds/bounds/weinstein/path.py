@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 
 from locbounds.axes import Float, ndarray
-from locbounds.bounds.weinstein.gram import LOST, gram
+from locbounds.bounds.weinstein.gram import LOST, ROUNDING, gram
 
 LENGTHS = (1.0, 2.0, 3.0)  # of the test shifts, relative to each other
 SCALES = np.geomspace(0.02, 2.5, 22)  # common scales, in deviations of the Gaussian problem
@@ -103,15 +103,27 @@ class _Shifts:
         return np.einsum("...ii->...i", bounds)[:, :count].sum(-1), bounds
 
 
-def projected(H: Float[ndarray, "*n m state"], G: Float[ndarray, "*n m m"]) -> Float[ndarray, "*n state state"]:
+def projected(
+    H: Float[ndarray, "*n m state"], G: Float[ndarray, "*n m m"], before: Float[ndarray, "*n m m"] | None = None
+) -> Float[ndarray, "*n state state"]:
     """``H' G^-1 H``; combinations of test functions that vanish up to rounding are left out, which keeps it valid.
 
+    Parameters
+    ----------
+    H, G
+        Shifts and Gram matrix.
+    before
+        What another block was subtracted from to get G: rounding of its size is added, so that nothing is made of it.
+
+    Examples
+    --------
     >>> projected(np.array([[1.0]]), np.array([[2.0]])).round(12)
     array([[0.5]])
     """
-    scale = np.sqrt(np.einsum("...ii->...i", G))
+    scale = np.sqrt(np.einsum("...ii->...i", G if before is None else before))
     values, vectors = np.linalg.eigh(G / scale[..., :, None] / scale[..., None, :])
-    kept = values > LOST * values[..., -1:]
+    values = values + (0.0 if before is None else ROUNDING)
+    kept = values > LOST * np.maximum(values[..., -1:], 0.0)
     part = np.swapaxes(vectors, -1, -2) @ (H / scale[..., None])
     part = part * np.where(kept, 1 / np.sqrt(np.where(kept, values, 1.0)), 0.0)[..., None]
     return np.swapaxes(part, -1, -2) @ part
