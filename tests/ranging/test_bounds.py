@@ -112,6 +112,21 @@ def test_cut_noise_is_refused_by_the_bound_that_needs_an_information():
         distance_bcrb(model(toa(noise=cut(3.5))))
 
 
+def test_a_given_information_is_checked_and_named_in_the_verdict():
+    sensor = toa(bias=None)
+    J = information(model(sensor))
+    given, found = distance_bcrb(model(toa(noise=cut(3.5))), given=J), distance_bcrb(model(sensor))
+    np.testing.assert_array_equal(given.position_mse, found.position_mse)
+    assert found.verdict.status is Status.VALID
+    assert given.verdict.status is Status.CONDITIONAL
+    assert "the information as given" in str(given.verdict)
+    both = distance_bcrb(model(rss()), track=track(), given=J)
+    assert both.verdict.reasons == ("conditional on the trajectory", "the information as given")
+    for wrong, words in ((J[:-1], "shape"), (np.append(J, 1.0), "shape"), (-J, "negative"), (J * np.nan, "not finite")):
+        with pytest.raises(lb.InputError, match=words):
+            distance_bcrb(model(sensor), given=wrong)
+
+
 def log_density(e):
     """Of cut Gaussian noise (3.5 cycles) plus a uniform bias (0 to 3), by its closed form."""
     s, g = 3.5, 3.0

@@ -1,8 +1,6 @@
 """Bounds for one distance over time: by quadrature where there is an information, Weiss-Weinstein for any noise."""
 
-from functools import partial
-
-import jax
+import equinox as eqx
 import numpy as np
 
 from locbounds.axes import Float, ndarray
@@ -88,7 +86,8 @@ def distance_bcrb(
     track
         Distances at steps 0..K: the number is then conditional on them, and no bound on errors there.
     given
-        Information per step, 1/m^2, in place of :func:`information` (for numbers as printed elsewhere).
+        Information of steps 1..K, 1/m^2, in place of :func:`information` (for numbers as printed elsewhere). Nothing is
+        asked of the noise then, and the verdict says that the bound is as good as this information.
     derivatives
         What is known of d', d'', ...: ``"initial"``, their prior at step 0, or ``"every step"``: their prior taken as a
         further measurement at each step, which counts one fact K times and is over-confident.
@@ -103,7 +102,8 @@ def distance_bcrb(
     Raises
     ------
     RefusedError, InputError
-        As for :func:`information`; if the reading is none.
+        As for :func:`information`; if the reading is none; if the given information has another shape, is negative or
+        not finite.
 
     Notes
     -----
@@ -121,32 +121,46 @@ def distance_bcrb(
     if derivatives not in READINGS:
         raise InputError(f"derivatives is {derivatives!r}", f"Give {' or '.join(READINGS)}")
     horizon = Horizon.parse(horizon, model.steps)
-    J = information(model, track) if given is None else np.asarray(given, dtype=float)
+    J = information(model, track) if given is None else _checked(given, model.steps)
     extra = None
     if derivatives == "every step":
         if not np.all(model.std[1:] > 0):
             raise InputError("a derivative has no prior deviation", "Give positive ones to measure it every step")
         extra = np.zeros((model.steps + 1, model.size, model.size))
         extra[1:, range(1, model.size), range(1, model.size)] = model.std[1:] ** -2.0
-    P = np.asarray(_recursion(model, J, extra, horizon=horizon))
+    P = np.asarray(_recursion(model, J, extra, horizon))
     entry = method("bcrb")
-    conditions = (("conditional on the trajectory",) if track is not None else ()) + (
-        ("the derivatives measured anew at every step, which counts one prior many times",) if extra is not None else ()
-    )
-    verdict = Verdict(Status.CONDITIONAL, conditions) if conditions else Verdict(Status.VALID, entry.grounds)
+    conditions = [
+        text
+        for text, said in (
+            ("conditional on the trajectory", track is not None),
+            ("the information as given", given is not None),
+            ("the derivatives measured anew at every step, which counts one prior many times", extra is not None),
+        )
+        if said
+    ]
+    verdict = Verdict(Status.CONDITIONAL, tuple(conditions)) if conditions else Verdict(Status.VALID, entry.grounds)
     return _result(entry.id, entry.name + horizon.label, model, P, verdict, horizon, track, "quadrature")
 
 
+def _checked(given: Float[ndarray, " steps"], steps: int) -> Float[ndarray, " steps"]:
+    J = np.asarray(given, dtype=float)
+    if J.shape != (steps,):
+        raise InputError(f"the information has shape {J.shape}", f"Give {steps} numbers, at steps 1..K")
+    if not np.all(np.isfinite(J) & (J >= 0)):
+        raise InputError("the information is negative or not finite at some step", "Give numbers of at least zero")
+    return J
+
+
 @double_precision
-def _recursion(model: DistanceModel, J: ndarray, extra: ndarray | None, *, horizon: Horizon):
+def _recursion(model: DistanceModel, J: ndarray, extra: ndarray | None, horizon: Horizon):
     motion = model.motion
     linear = LinearModel(motion.F, motion.Q, model.prior.covariance, (0,), (0,))
-    return _solve(linear, J.reshape(-1, 1, 1, 1, 1), extra, horizon=horizon)
+    return _solve(linear, J.reshape(-1, 1, 1, 1, 1), extra, horizon)
 
 
-@partial(jax.jit, static_argnames="horizon")
-def _solve(linear, increments, extra, *, horizon):
-    linear = linear._replace(observed=(0,), position=(0,))
+@eqx.filter_jit
+def _solve(linear, increments, extra, horizon):
     return bound_recursion(linear, GivenIncrements(increments), horizon, extra)[0]
 
 
