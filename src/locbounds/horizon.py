@@ -33,6 +33,14 @@ class Horizon(NamedTuple):
             return f", {self.ahead} step{'s' if self.ahead > 1 else ''} ahead"
         return ", smoothing" if self.kind == SMOOTH else ""
 
+    def last(self, k: int, steps: int) -> int:
+        """The last step whose measurements an estimator of x_k may use, of a record with so many steps.
+
+        >>> [Horizon.parse(text, 9).last(4, 9) for text in ("filter", "predict:3", "predict:6", "smooth")]
+        [4, 1, 0, 9]
+        """
+        return steps if self.kind == SMOOTH else max(k - self.ahead, 0)
+
     def sees(self, filtering: frozenset[str]) -> frozenset[str]:
         """What may be seen with this horizon, given what a filter may see.
 

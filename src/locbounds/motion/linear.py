@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float, Scalar
+from locbounds.axes import Array, Float, Scalar, ndarray
 from locbounds.errors import InputError, RefusedError
 from locbounds.linalg import is_positive_semidefinite
 from locbounds.motion.base import Motion
@@ -95,3 +95,37 @@ class LinearMotion(Motion):
                 "Give one F and one Q per step",
             )
         return self
+
+
+def whitened(
+    F: Float[ndarray, "steps state state"],
+    first: Float[ndarray, "state numbers"],
+    roots: Float[ndarray, "steps state inputs"],
+) -> Float[ndarray, "times state theta"]:
+    """How independent standard normal numbers theta (those of x_0, then those of every step) make the states.
+
+    Parameters
+    ----------
+    F
+        ``x_k = F[k-1] x_{k-1} + v_k`` for k = 1..K.
+    first, roots
+        Any matrices R whose ``R R'`` are the covariances of x_0 and of v_1..v_K.
+
+    Returns
+    -------
+    X
+        [steps+1, state, theta]: the deviation of x_k from its mean is ``X_k theta``.
+
+    Examples
+    --------
+    >>> whitened(np.ones((2, 1, 1)), np.array([[2.0]]), np.array([[[1.0]], [[3.0]]]))[:, 0].tolist()
+    [[2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [2.0, 1.0, 3.0]]
+    """
+    steps, _, inputs = roots.shape
+    start = first.shape[1]
+    X = np.zeros((steps + 1, len(first), start + steps * inputs))
+    X[0, :, :start] = first
+    for k in range(1, steps + 1):
+        X[k] = F[k - 1] @ X[k - 1]
+        X[k, :, start + (k - 1) * inputs : start + k * inputs] = roots[k - 1]
+    return X

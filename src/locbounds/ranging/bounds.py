@@ -6,9 +6,9 @@ import numpy as np
 from locbounds.axes import Float, ndarray
 from locbounds.bounds.backward import bound_recursion
 from locbounds.bounds.recursion import GivenIncrements, LinearModel
-from locbounds.bounds.weinstein import path_bound
+from locbounds.bounds.weinstein import path_bounds
 from locbounds.errors import InputError, RefusedError
-from locbounds.horizon import PREDICT, SMOOTH, Horizon
+from locbounds.horizon import Horizon
 from locbounds.noise.log_coefficient import log_coefficient, rough_variance
 from locbounds.precision import double_precision
 from locbounds.ranging.model import DistanceModel
@@ -18,7 +18,6 @@ from locbounds.result import Provenance, Result
 from locbounds.verdict import Status, Verdict
 
 READINGS = ("initial", "every step")
-GUESSES = (0.5, 1.0, 4.0)  # of the information, in units of one over the variance: they choose test directions only
 
 
 def slopes(model: DistanceModel, track: Float[ndarray, " times"] | None) -> Float[ndarray, "sensors steps"]:
@@ -207,31 +206,21 @@ def distance_wwb(
     laws = [sensor.epoch_noise() for sensor in model.sensors]
     tables = [log_coefficient(noise) for noise, _ in laws]
     counts = [count for _, count in laws]
-    D, _ = model.whitened()
-    sensors = len(laws)
     rough = np.array([c / rough_variance(noise) for noise, c in laws])
 
-    def log_rho(moved: ndarray) -> ndarray:  # of all sensors at step 1, then at step 2, ...
+    def log_rho(moved: ndarray) -> ndarray:
         total = np.zeros(moved.shape[1:])
         for m, (table, count) in enumerate(zip(tables, counts, strict=True)):
-            total = total + count * table(moved[m::sensors]).sum(0)
+            total = total + count * table(moved[m :: len(laws)]).sum(0)
         return total
 
     horizon = Horizon.parse(horizon, model.steps)
-    mse = []
-    for k in range(model.steps + 1):
-        last = {PREDICT: max(k - horizon.ahead, 0), SMOOTH: model.steps}.get(horizon.kind, k)
-        if last == 0:
-            mse.append(float(D[k] @ D[k]))
-            continue
-        rows = (D[1 : last + 1, None] * steep.T[:last, :, None]).reshape(last * sensors, -1)
-        guesses = np.outer(GUESSES, np.tile(rough, last))
-        mse.append(float(path_bound(rows, log_rho, guesses, D[k : k + 1], 1)[0][0, 0]))
+    X = model.whitened()[:, :1]  # the distance is all that is measured, and all that is asked for
+    P = path_bounds(X, steep[..., None], rough, log_rho, np.array([0]), horizon)
     entry = method("wwb-recursive")
     verdict = Verdict(Status.VALID, entry.grounds)
     if track is not None:
         verdict = Verdict(Status.CONDITIONAL, ("conditional on the trajectory",))
-    P = np.array(mse)[:, None, None]
     name = entry.name + horizon.label
     return _result(entry.id, name, model, P, verdict, horizon, track, "test functions that shift whole paths")
 

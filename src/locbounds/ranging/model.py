@@ -9,6 +9,7 @@ import numpy as np
 from locbounds.axes import Array, Float, ndarray
 from locbounds.errors import InputError
 from locbounds.motion import LinearMotion
+from locbounds.motion.linear import whitened
 from locbounds.precision import float64
 from locbounds.priors import GaussianPrior
 from locbounds.ranging.sensors import Sensor
@@ -109,28 +110,13 @@ class DistanceModel(eqx.Module):
         now |= {"driving_std": self.driving_std, "sensors": self.sensors}
         return DistanceModel(**(now | changes))
 
-    def whitened(self) -> tuple[Float[ndarray, "times theta"], ndarray]:
-        """How independent standard normal numbers (those of x_0, then one per step) make the distances at steps 0..K.
-
-        Returns
-        -------
-        D
-            [steps+1, theta].
-        X
-            The same for whole states, [steps+1, state, theta].
-        """
-        n, K = self.size, self.steps
-        X = np.zeros((K + 1, n, n + K))
-        X[0, :, :n] = np.diag(self.std)
-        F, G = np.asarray(self.motion.F), self.inputs
-        for k in range(1, K + 1):
-            X[k] = F[k - 1] @ X[k - 1]
-            X[k, :, n + k - 1] = G[k - 1]
-        return X[:, 0], X
+    def whitened(self) -> Float[ndarray, "times state theta"]:
+        """How independent standard normal numbers (those of x_0, then one per step) make the states at steps 0..K."""
+        return whitened(np.asarray(self.motion.F), np.diag(self.std), self.inputs[:, :, None])
 
     def simulate_states(self, runs: int, seed: int = 0) -> Float[ndarray, "runs times state"]:
         """Draw states at steps 0..K."""
-        _, X = self.whitened()
+        X = self.whitened()
         mean = [np.asarray(self.start)]
         for F in np.asarray(self.motion.F):
             mean.append(F @ mean[-1])

@@ -6,13 +6,17 @@ from typing import Any
 import numpy as np
 
 from locbounds.axes import Float, ndarray
+from locbounds.bounds.ahead import predicted
+from locbounds.bounds.recursion import LinearModel
 from locbounds.bounds.weinstein.coefficients import ModelCoefficients
-from locbounds.bounds.weinstein.path import path_bound
+from locbounds.bounds.weinstein.path import path_bounds
 from locbounds.bounds.weinstein.recursion import weiss_weinstein_recursion
 from locbounds.errors import InputError, RefusedError
-from locbounds.horizon import FILTER, PREDICT, SMOOTH, Horizon
+from locbounds.horizon import PREDICT, SMOOTH, Horizon
+from locbounds.linalg import psd_root
 from locbounds.model import JumpMarkov, jump_markov
 from locbounds.model.linear import gradients, matrices, singular_motion
+from locbounds.motion.linear import whitened
 from locbounds.noise.log_coefficient import rough_variance
 from locbounds.precision import double_precision
 from locbounds.registry import method
@@ -25,8 +29,6 @@ SIZES = (0.6, 1.2, 2.0)  # of the test shifts along each axis, relative to each 
 SCALES = np.geomspace(0.03, 1.5, 12)  # common scales, in conditional deviations
 FINER = 6
 LONGEST = 60.0  # conditional deviations: where the search for a common scale ends
-# of the information, in units of one over the smallest variance: they choose directions only
-GUESSES = (0.2, 1.0, 10.0)
 
 
 @double_precision
@@ -119,9 +121,10 @@ def wwb_recursive(
         axes = _axes(model, F, Q, P0, slopes)
         P, best = _states(F, Q, P0, axes, coefficients, index, np.asarray(sizes, dtype=float), scale)
         if horizon.kind == PREDICT:
-            P = _ahead(P, F, Q, P0, horizon.ahead)
+            P = np.asarray(predicted(LinearModel(F, Q, P0, (), ()), P, horizon.ahead))
     if moved != "states":
-        other = _paths(F, Q, P0, slopes, coefficients, index, horizon)
+        X = whitened(F, np.asarray(psd_root(P0)), np.asarray(psd_root(Q)))
+        other = path_bounds(X, slopes, 1 / _least_variances(model), coefficients.path, index, horizon)
         larger = other[:, index, index].sum(-1) > P[:, index, index].sum(-1)
         P, best = np.where(larger[:, None, None], other, P), np.where(larger, np.nan, best)
     mse = P[:, index, index].sum(-1)
@@ -182,16 +185,6 @@ def _states(
     return found[best, np.arange(len(axes))], tried[best]
 
 
-def _ahead(P: ndarray, F: ndarray, Q: ndarray, P0: ndarray, ahead: int) -> ndarray:
-    out = []
-    for k in range(len(P)):
-        S, first = (P[k - ahead], k - ahead) if k >= ahead else (P0, 0)
-        for i in range(first, k):
-            S = F[i] @ S @ F[i].T + Q[i]
-        out.append(S)
-    return np.stack(out)
-
-
 def _axes(model: JumpMarkov, F: ndarray, Q: ndarray, P0: ndarray, slopes: ndarray) -> Float[ndarray, "times n n"]:
     """Test directions of every state: columns of a root of its covariance given all others, roughly."""
     inverse = [np.linalg.inv(P0), *np.linalg.inv(Q)]
@@ -208,37 +201,3 @@ def _axes(model: JumpMarkov, F: ndarray, Q: ndarray, P0: ndarray, slopes: ndarra
 def _least_variances(model: JumpMarkov) -> Float[ndarray, " channels"]:
     channels: Any = model.channels
     return np.array([min(rough_variance(n) for n in channel.noises) for channel in channels])
-
-
-def _paths(
-    F: ndarray, Q: ndarray, P0: ndarray, slopes: ndarray, coefficients: ModelCoefficients, index: ndarray,
-    horizon: Horizon,
-) -> Float[ndarray, "times state state"]:  # fmt: skip
-    """Bounds by shifts of whole paths."""
-    steps, n = len(F), len(P0)
-    X = np.zeros((steps + 1, n, n * (steps + 1)))  # x_k = X_k theta
-    X[0, :, :n] = _root(P0)
-    for k in range(1, steps + 1):
-        X[k] = F[k - 1] @ X[k - 1]
-        X[k, :, n * k : n * (k + 1)] = _root(Q[k - 1])
-    D = np.einsum("cka,kat->kct", slopes, X[1:])
-    rough = 1 / _least_variances(coefficients.model)
-    order = np.concatenate([index, np.setdiff1d(np.arange(n), index)])
-    out = []
-    for k in range(steps + 1):
-        last = {FILTER: k, PREDICT: max(k - horizon.ahead, 0), SMOOTH: steps}[horizon.kind]
-        if last == 0:
-            out.append(X[k] @ X[k].T)
-            continue
-        rows = D[:last].reshape(last * len(rough), -1)
-        size = n * (max(last, k) + 1)  # later noises change nothing
-        guesses = np.outer(GUESSES, np.tile(rough, last))
-        bound, _ = path_bound(rows[:, :size], coefficients.path, guesses, X[k][order, :size], len(index))
-        back = np.argsort(order)
-        out.append(bound[np.ix_(back, back)])
-    return np.stack(out)
-
-
-def _root(S: ndarray) -> ndarray:
-    values, vectors = np.linalg.eigh(S)
-    return vectors * np.sqrt(np.maximum(values, 0.0))

@@ -18,7 +18,9 @@ import numpy as np
 
 from locbounds.axes import Float, ndarray
 from locbounds.bounds.weinstein.gram import LOST, ROUNDING, gram
+from locbounds.horizon import Horizon
 
+GUESSES = (0.2, 1.0, 10.0)  # of the information, in units of a rough one
 LENGTHS = (1.0, 2.0, 3.0)  # of the test shifts, relative to each other
 SCALES = np.geomspace(0.02, 2.5, 22)  # common scales, in deviations of the Gaussian problem
 LONGEST = 100.0  # deviations: where the search ends
@@ -28,13 +30,61 @@ NOTHING = 1e-12  # relative variance of a direction that says nothing new
 LogRho = Callable[[Float[ndarray, "rows *n"]], Float[ndarray, "*n"]]
 
 
+def path_bounds(
+    X: Float[ndarray, "times state theta"],
+    slopes: Float[ndarray, "channels steps state"],
+    information: Float[ndarray, " channels"],
+    log_rho: LogRho,
+    index: ndarray,
+    horizon: Horizon,
+) -> Float[ndarray, "times state state"]:
+    """Bounds at steps 0..K on the mean square error matrices of states that are linear in theta.
+
+    Parameters
+    ----------
+    X
+        How theta makes the states.
+    slopes
+        Gradients of what the channels measure at steps 1..K.
+    information
+        Rough information per measurement of each channel.
+    log_rho
+        Logarithm of the coefficient of all measurements of steps 1..j, for the shifts of what all channels measure at
+        step 1, then at step 2, ...
+    index
+        Components of the position.
+    horizon
+        Which measurements may be used.
+
+    Examples
+    --------
+    A walk from a known place, measured with a standard deviation of 1/2:
+
+    >>> X, gaussian = np.tril(np.ones((3, 2)), -1)[:, None], lambda u: -np.sum(u**2, 0) / 2
+    >>> path_bounds(X, np.ones((1, 2, 1)), np.array([4.0]), gaussian, np.array([0]), Horizon())[:, 0, 0].round(4)
+    array([0.    , 0.2   , 0.2069])
+    """
+    D = np.einsum("cka,kat->kct", slopes, X[1:])
+    out = []
+    for k, X_k in enumerate(X):
+        last = horizon.last(k, len(X) - 1)
+        if last == 0:
+            out.append(X_k @ X_k.T)
+            continue
+        rows = D[:last].reshape(last * len(information), -1)
+        matter = np.any(rows != 0, 0) | np.any(X_k != 0, 0)  # later noises do not
+        guesses = np.outer(GUESSES, np.tile(information, last))
+        out.append(path_bound(rows[:, matter], log_rho, guesses, X_k[:, matter], index))
+    return np.stack(out)
+
+
 def path_bound(
     D: Float[ndarray, "rows theta"],
     log_rho: LogRho,
     information: Float[ndarray, "guesses rows"],
     X: Float[ndarray, "state theta"],
-    count: int,
-) -> tuple[Float[ndarray, "state state"], float]:
+    index: ndarray,
+) -> Float[ndarray, "state state"]:
     """Bound on the mean square error matrix of a linear function of the path.
 
     Parameters
@@ -47,60 +97,55 @@ def path_bound(
         Guesses of the information per measurement, which set the directions; none can do harm.
     X
         How theta makes the state whose error is bounded.
-    count
-        The scale is that of the bound which is largest in the sum of its first ``count`` diagonal entries.
-
-    Returns
-    -------
-    bound, scale
-        The bound, and the scale of its test shifts in deviations of the Gaussian problem.
+    index
+        The scale is that of the bound which is largest in the sum of these diagonal entries.
 
     Examples
     --------
     One standard normal number, measured with a standard deviation of 1/2: the Bayesian variance is 1/5.
 
-    >>> bound, _ = path_bound(np.ones((1, 1)), lambda u: -(u[0] ** 2) / 2, np.array([[4.0]]), np.ones((1, 1)), 1)
-    >>> bound.round(4)
+    >>> one = np.ones((1, 1))
+    >>> path_bound(one, lambda u: -(u[0] ** 2) / 2, np.array([[4.0]]), one, np.array([0])).round(4)
     array([[0.2]])
     """
+    first = np.concatenate([index, np.setdiff1d(np.arange(len(X)), index)])
     units = []
     for i in information:
-        V = np.linalg.solve(np.eye(D.shape[1]) + (D.T * i) @ D, X.T)
-        units.append(_orthogonal(V, X @ V))
+        V = np.linalg.solve(np.eye(D.shape[1]) + (D.T * i) @ D, X[first].T)
+        units.append(_orthogonal(V, X[first] @ V))
     units = np.concatenate(units)
     if not len(units):
-        return np.zeros((len(X), len(X))), float("nan")
-    bounds_at = _Shifts(D, X, (units[:, None] * np.array(LENGTHS)[:, None]).reshape(-1, D.shape[1]), log_rho)
-    scales, (value, _) = SCALES, bounds_at(SCALES, count)
+        return np.zeros((len(X), len(X)))
+    bounds_at = _Shifts(D, X, (units[:, None] * np.array(LENGTHS)[:, None]).reshape(-1, D.shape[1]), log_rho, index)
+    scales, (value, _) = SCALES, bounds_at(SCALES)
     while np.argmax(value) == len(scales) - 1 and scales[-1] < LONGEST:  # the grid is too short
         scales = np.append(scales, scales[-1] * np.array([1.5, 2.25]))
-        value = np.append(value, bounds_at(scales[-2:], count)[0])
+        value = np.append(value, bounds_at(scales[-2:])[0])
     at = int(np.argmax(value))
     near = np.geomspace(scales[max(at - 1, 0)], scales[min(at + 1, len(scales) - 1)], FINER)
-    value, bounds = bounds_at(near, count)
-    at = int(np.argmax(value))
-    return bounds[at], float(near[at])
+    value, bounds = bounds_at(near)
+    return bounds[int(np.argmax(value))]
 
 
 class _Shifts:
     """Bounds for scaled copies of some shifts of theta."""
 
-    def __init__(self, D: ndarray, X: ndarray, shifts: ndarray, log_rho: LogRho):
-        self.H, self.log_rho = shifts @ X.T, log_rho
+    def __init__(self, D: ndarray, X: ndarray, shifts: ndarray, log_rho: LogRho, index: ndarray):
+        self.H, self.log_rho, self.index = shifts @ X.T, log_rho, index
         self.parts = [
             (np.sum(u**2, -1), np.moveaxis(u @ D.T, -1, 0)[..., None])
             for u in (shifts[:, None] - shifts, shifts[:, None] + shifts, shifts)
         ]
 
-    def __call__(self, scales: ndarray, count: int) -> tuple[ndarray, ndarray]:
-        """Sum of the first diagonal entries [scales], and the matrices [scales, state, state]."""
+    def __call__(self, scales: ndarray) -> tuple[ndarray, ndarray]:
+        """Sums of the diagonal entries of the index [scales], and the matrices [scales, state, state]."""
         logs = [
             np.moveaxis(-square[..., None] * scales**2 / 8 + self.log_rho(moved * scales), -1, 0)
             for square, moved in self.parts
         ]
         H = scales[:, None, None] * self.H
         bounds = projected(H, gram(*logs))
-        return np.einsum("...ii->...i", bounds)[:, :count].sum(-1), bounds
+        return bounds[:, self.index, self.index].sum(-1), bounds
 
 
 def projected(
