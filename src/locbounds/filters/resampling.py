@@ -1,7 +1,5 @@
 """Systematic resampling of many particle clouds at once."""
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 
@@ -12,8 +10,8 @@ def systematic(w: Float[Array, "particles tracks"], u: Float[Array, " tracks"]) 
     """Which particle each of the new ones copies: one uniform number per cloud.
 
     Particle i is copied as often as one of the points ``(j + u) / N`` falls between the sums of the weights before it
-    and up to it: floor or ceiling of ``N w_i``, its expectation. Points and sums are both sorted, so that the
-    particle of slot j is the number of sums that do not exceed its point, found by bisection.
+    and up to it: floor or ceiling of ``N w_i``, its expectation. The number of points before a sum is its slot; every
+    particle is written into its first slot, and each of the later ones copies what stands before it.
 
     Parameters
     ----------
@@ -29,16 +27,8 @@ def systematic(w: Float[Array, "particles tracks"], u: Float[Array, " tracks"]) 
     """
     particles, tracks = w.shape
     sums = jnp.cumsum(w, axis=0)
-    sums = (sums / sums[-1]).reshape(-1)
-    points = (jnp.arange(particles)[:, None] + u) / particles
-    track = jnp.arange(tracks)
-    halvings = max(1, (particles - 1).bit_length())
-
-    def halve(_: Any, bracket: tuple[Array, Array]) -> tuple[Array, Array]:
-        low, high = bracket
-        middle = (low + high) // 2
-        passed = jnp.take(sums, middle * tracks + track, mode="clip") <= points
-        return jnp.where(passed, middle + 1, low), jnp.where(passed, high, middle)
-
-    whole = jnp.zeros(w.shape, int), jnp.full(w.shape, particles - 1)
-    return jax.lax.fori_loop(0, halvings, halve, whole)[0]
+    after = jnp.clip(jnp.ceil(sums / sums[-1] * particles - u), 0, particles).astype(int).at[-1].set(particles)
+    first = jnp.concatenate([jnp.zeros((1, tracks), int), after[:-1]])
+    number = jnp.where(after > first, jnp.arange(particles)[:, None], 0)
+    slots = jnp.zeros(w.shape, int).at[jnp.minimum(first, particles - 1), jnp.arange(tracks)].max(number)
+    return jax.lax.cummax(slots, axis=0)

@@ -9,10 +9,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from locbounds.axes import Array, Float, Int, ndarray
+from locbounds.axes import Array, Float, ndarray
 from locbounds.blocks import check_seed
 from locbounds.errors import InputError
 from locbounds.filters import Estimates
+from locbounds.filters.resampling import systematic
 from locbounds.noise import Gaussian
 from locbounds.precision import double_precision
 from locbounds.ranging.likelihood import limits, table
@@ -126,21 +127,6 @@ def _looked_up(
     return jnp.where(inside, jnp.where(both, smooth, edge), -jnp.inf)
 
 
-def _systematic(w: Float[Array, "particles runs"], u: Float[Array, " runs"]) -> Int[Array, "particles runs"]:
-    """Which particle each of the new ones copies, as :func:`locbounds.filters.resampling.systematic`; one pass.
-
-    >>> jax.jit(_systematic)(jnp.array([[0.1], [0.6], [0.3], [0.0]]), jnp.array([0.5]))[:, 0].tolist()
-    [1, 1, 1, 2]
-    """
-    N, runs = w.shape
-    sums = jnp.cumsum(w, axis=0)
-    after = jnp.clip(jnp.ceil(sums / sums[-1] * N - u), 0, N).astype(int).at[-1].set(N)
-    first = jnp.concatenate([jnp.zeros((1, runs), int), after[:-1]])
-    number = jnp.where(after > first, jnp.arange(N)[:, None], 0)
-    start = jnp.zeros((N, runs), int).at[jnp.minimum(first, N - 1), jnp.arange(runs)].max(number)
-    return jax.lax.cummax(start, axis=0)
-
-
 class _Motion(NamedTuple):
     """The law of the distance given the earlier distances, as a Kalman filter that sees them exactly has it.
 
@@ -214,7 +200,7 @@ def _some_runs(motion: _Motion, sensors: Any, tables: Any, z: Any, key: Any, N: 
         F, K, root, P, key, here = piece
         move, draw = jax.random.split(key)
         x = jnp.stack([sum(F[a, b] * x[b] for b in range(n)) for a in range(n)])
-        x = x + (K * root)[:, None, None] * jax.random.normal(move, (N, runs), jnp.float32)
+        x = x + (K * root)[:, None, None] * jax.random.normal(move, (N, runs))
         low, high = possible(here)
         left, right = jnp.maximum(low, x[0].min(0)), jnp.minimum(high, x[0].max(0))
         apart = ~(right > left)
@@ -232,7 +218,7 @@ def _some_runs(motion: _Motion, sensors: Any, tables: Any, z: Any, key: Any, N: 
         e = x - mean[:, None]
         spread = jnp.stack([jnp.stack([jnp.sum(w * a * b, 0) for b in e], -1) for a in e], -1) + P
         few = jnp.sum(w**2, 0) * N * LEAST_SHARE > 1
-        chosen = jnp.where(few, _systematic(w, jax.random.uniform(draw, (runs,))), jnp.arange(N)[:, None])
+        chosen = jnp.where(few, systematic(w, jax.random.uniform(draw, (runs,))), jnp.arange(N)[:, None])
         x = jnp.take_along_axis(x, chosen[None], axis=1)
         return (x, jnp.where(few, 0.0, weight - weight.max(0))), (mean.T, spread, lost)
 
