@@ -96,27 +96,31 @@ class Predicted(_OfFilter):
         """Filter and predict many tracks; arguments as for the filter."""
         Horizon.parse(self.horizon, scenario.steps)
         mean, spread, F, Q = self._run(scenario, z, seed, sight)
-        times, N = scenario.steps + 1, self.ahead
-
-        def moved(first: ndarray, later: ndarray, move: Any) -> ndarray:
-            rows = [first]
-            for k in range(1, N):
-                rows.append(move(rows[-1], k - 1))
-            out = np.empty((len(later), times, *later.shape[2:]))
-            for k in range(times):
-                if k < N:
-                    out[:, k] = rows[k]
-                else:
-                    out[:, k] = later[:, k - N]
-                    for i in range(k - N, k):
-                        out[:, k] = move(out[:, k], i)
-            return out
-
-        m = moved(np.asarray(scenario.prior.mean), mean, lambda x, k: x @ F[k].T)
+        m = _moved(np.asarray(scenario.prior.mean), mean, self.ahead, lambda x, at: _applied(F[at], x))
         P = None
         if spread is not None:
-            P = moved(np.asarray(scenario.prior.covariance), spread, lambda P, k: F[k] @ P @ F[k].T + Q[k])
+            start = np.asarray(scenario.prior.covariance)
+            P = _moved(start, spread, self.ahead, lambda P, at: F[at] @ P @ np.swapaxes(F[at], -1, -2) + Q[at])
         return Estimates(m, P)
+
+
+def _applied(F: ndarray, x: ndarray) -> ndarray:
+    return (F @ x[..., None])[..., 0]
+
+
+def _moved(prior: ndarray, later: ndarray, ahead: int, move: Any) -> ndarray:
+    """What is known at steps 0..K, [runs, times, ...], moved on by some steps; ``move(values, steps)`` moves by one.
+
+    The whole record moves at once: what starts at step k is moved from k + i to k + i + 1 in round i.
+    """
+    kept = later.shape[1] - ahead
+    first = [prior]
+    for i in range(ahead - 1):
+        first.append(move(first[-1], i))
+    later = later[:, :kept]
+    for i in range(ahead):
+        later = move(later, np.arange(kept) + i)
+    return np.concatenate([np.broadcast_to(np.stack(first), (len(later), *np.shape(first))), later], axis=1)
 
 
 class Smoothed(_OfFilter):

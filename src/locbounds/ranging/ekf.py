@@ -39,7 +39,7 @@ class DistanceEkf:
         """Filter many runs; ``z`` as from :func:`~locbounds.ranging.measure`."""
         runs, n = len(z[0]), model.size
         moments = [sensor.mean_and_variance() for sensor in model.sensors]
-        x = np.broadcast_to(np.asarray(model.start), (runs, n)).copy()
+        x = np.broadcast_to(np.asarray(model.mean), (runs, n)).copy()
         P = np.broadcast_to(np.diag(np.asarray(model.std) ** 2), (runs, n, n)).copy()
         F, Q = np.asarray(model.motion.F), np.asarray(model.motion.Q)
         means, spreads = [x.copy()], [P.copy()]

@@ -1,7 +1,6 @@
 """One distance over time: its derivatives as the state, driven by a random highest derivative."""
 
 import math
-from typing import Any
 
 import equinox as eqx
 import numpy as np
@@ -49,22 +48,18 @@ class DistanceModel(eqx.Module):
     """
 
     times: Times
-    start: Float[Array, " state"] = eqx.field(converter=float64)
+    mean: Float[Array, " state"] = eqx.field(converter=float64)
     std: Float[Array, " state"] = eqx.field(converter=float64)
     driving_std: Float[Array, ""] = eqx.field(converter=float64)
     sensors: tuple[Sensor, ...] = eqx.field(converter=tuple)
 
-    def __init__(self, times: Times, mean: Any, std: Any, driving_std: Any, sensors: Any):
-        self.times, self.start, self.std = times, mean, std
-        self.driving_std, self.sensors = driving_std, sensors
-
     def __check_init__(self):
-        if self.start.ndim != 1 or self.start.shape != self.std.shape or not len(self.start):
+        if self.mean.ndim != 1 or self.mean.shape != self.std.shape or not len(self.mean):
             raise InputError(
-                f"the prior's means have shape {self.start.shape}, its deviations {self.std.shape}",
+                f"the prior's means have shape {self.mean.shape}, its deviations {self.std.shape}",
                 "Give one number each for the distance and its derivatives",
             )
-        if not (np.all(np.isfinite(self.start)) and np.all(np.isfinite(self.std)) and np.all(self.std >= 0)):
+        if not (np.all(np.isfinite(self.mean)) and np.all(np.isfinite(self.std)) and np.all(self.std >= 0)):
             raise InputError("the prior's numbers are not finite, or a deviation is negative", "Correct them")
         if not (np.isfinite(self.driving_std) and self.driving_std >= 0):
             raise InputError(f"the driving deviation is {self.driving_std}", "Give zero or a positive number")
@@ -74,7 +69,7 @@ class DistanceModel(eqx.Module):
     @property
     def size(self) -> int:
         """Number of state components."""
-        return len(self.start)
+        return len(self.mean)
 
     @property
     def steps(self) -> int:
@@ -102,13 +97,7 @@ class DistanceModel(eqx.Module):
     @property
     def prior(self) -> GaussianPrior:
         """Law of the state at step 0."""
-        return GaussianPrior(self.start, np.diag(self.std**2))
-
-    def replace(self, **changes: Any) -> "DistanceModel":
-        """A copy with some fields changed: ``times``, ``mean``, ``std``, ``driving_std``, ``sensors``."""
-        now = {"times": self.times, "mean": self.start, "std": self.std}
-        now |= {"driving_std": self.driving_std, "sensors": self.sensors}
-        return DistanceModel(**(now | changes))
+        return GaussianPrior(self.mean, np.diag(self.std**2))
 
     def whitened(self) -> Float[ndarray, "times state theta"]:
         """How independent standard normal numbers (those of x_0, then one per step) make the states at steps 0..K."""
@@ -117,7 +106,7 @@ class DistanceModel(eqx.Module):
     def simulate_states(self, runs: int, seed: int = 0) -> Float[ndarray, "runs times state"]:
         """Draw states at steps 0..K."""
         X = self.whitened()
-        mean = [np.asarray(self.start)]
+        mean = [np.asarray(self.mean)]
         for F in np.asarray(self.motion.F):
             mean.append(F @ mean[-1])
         theta = np.random.default_rng([seed, 0]).normal(size=(runs, X.shape[-1]))

@@ -156,7 +156,7 @@ def _conditional(model: DistanceModel) -> _Motion:
         gains.append(gain)
         roots.append(np.sqrt(S))
         spreads.append(P)
-    numbers = (F, np.array(gains), np.array(roots), np.array(spreads), model.start, model.std[0])
+    numbers = (F, np.array(gains), np.array(roots), np.array(spreads), model.mean, model.std[0])
     return _Motion(*(jnp.asarray(a) for a in numbers))
 
 
