@@ -3,25 +3,26 @@
 One link is one distance, measured by a block of samples of both kinds. An error is ``bias + noise``: the noise is drawn
 for every sample, the bias stays the same for the block. Both laws are fitted on training points, everything else
 happens on test points that the fit has not seen. With Gaussian noise the block mean is sufficient (its density is that
-of one sample with law :func:`block_law`), and the prior of the distance is that of the training links: so the posterior
-mean and its mean square error, which no other estimator undercuts if the laws are right, are sums over these.
+of one sample with the law of :meth:`Sensor.epoch_noise`), and the prior of the distance is that of the training links:
+so the posterior mean and its mean square error, which no other estimator undercuts if the laws are right, are sums over
+these.
 """
 
-import csv
-import gzip
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pandas as pd
 
 from locbounds.axes import Float, ndarray
 from locbounds.errors import InputError
 from locbounds.fit.compare_laws import compare_noise_laws
-from locbounds.noise import Epoch, Gaussian, Noise
+from locbounds.io.csv_table import CsvTable
+from locbounds.noise import Gaussian, Noise
 from locbounds.precision import double_precision
-from locbounds.ranging import Strength, TimeOfArrival
+from locbounds.ranging import Sensor, Strength, TimeOfArrival
 
 FOLDER = "wifi_rtt_grid"
 FAMILIES = ("gaussian", "laplace", "exponentially-modified-gaussian")
@@ -56,11 +57,14 @@ class Row(NamedTuple):
     note: str
 
 
-def _table(path: Path) -> list[dict[str, str]]:
-    if not path.exists():
-        raise InputError(f"there is no {path}", "Give the folder of the data set")
-    with gzip.open(path, "rt") if path.suffix == ".gz" else path.open() as file:
-        return list(csv.DictReader(file))
+def _table(path: Path, names: list[str], numbers: list[str]) -> Any:
+    """Named columns of a file as a data frame; lines that lack a number are left out."""
+    table = CsvTable(path, path.name.partition(".")[0])
+    for column in (*names, *numbers):
+        if column not in table:
+            raise InputError(f"{path.name} has no column {column}", "Give the files of the data set as they are")
+    cells: dict[str, ndarray] = {name: table.text(name) for name in names}
+    return pd.DataFrame(cells | {name: table.numbers(name, empty=True) for name in numbers}).dropna()
 
 
 def read(folder: Path) -> dict[str, Links]:
@@ -69,26 +73,36 @@ def read(folder: Path) -> dict[str, Links]:
     Raises
     ------
     InputError
-        If a file is missing.
+        If a file is missing or no such table; if samples name a point or an anchor without a place.
     """
-    anchors = {(r["scene"], r["anchor_id"]): (float(r["x_m"]), float(r["y_m"])) for r in _table(folder / "anchors.csv")}
-    points = {(r["scene"], r["point_id"]): r for r in _table(folder / "points.csv")}
-    blocks: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
-    for r in _table(folder / "samples.csv.gz"):
-        if r["range_m"] and r["rssi_dbm"]:
-            key = r["scene"], r["point_id"], r["anchor_id"]
-            blocks.setdefault(key, []).append((float(r["range_m"]), float(r["rssi_dbm"])))
-    rows: dict[str, list[tuple]] = {}
-    for (scene, point, anchor), values in blocks.items():
-        place, z = points[scene, point], np.array(values)
-        here = np.array([float(place["x_m"]), float(place["y_m"])])
-        distance = float(np.linalg.norm(here - anchors[scene, anchor]))
-        if len(z) >= LEAST_SAMPLES and distance > 0:
-            spread = z.var(axis=0, ddof=1)
-            rows.setdefault(scene, []).append(
-                (int(point), place["split"] == "train", distance, *z.mean(axis=0), *spread, len(z))
+    at, values = ["x_m", "y_m"], ["range_m", "rssi_dbm"]
+    samples = _table(folder / "samples.csv.gz", ["scene", "anchor_id"], ["point_id", *values]).astype({"point_id": int})
+    blocks = samples.groupby(["scene", "point_id", "anchor_id"], sort=False)[values].agg(["mean", "var", "size"])
+    blocks.columns = ["_".join(names) for names in blocks.columns]
+    blocks = blocks.reset_index()
+    for name, texts, numbers in (("point", ["scene", "split"], ["point_id"]), ("anchor", ["scene", "anchor_id"], [])):
+        key = ["scene", f"{name}_id"]
+        places = _table(folder / f"{name}s.csv", texts, [*numbers, *at]).drop_duplicates(key, keep="last")
+        blocks = blocks.merge(places.rename(columns={axis: f"{axis}_{name}" for axis in at}), "left", on=key)
+        for _, lost in blocks[blocks[f"x_m_{name}"].isna()].iterrows():
+            raise InputError(
+                f"{name}s.csv has no place of {name} {lost[key[1]]} in {lost['scene']}", "Add a line with its place"
             )
-    return {scene: Links(*(np.array(column) for column in zip(*r, strict=True))) for scene, r in rows.items()}
+    blocks["distance_m"] = np.hypot(*(blocks[f"{axis}_point"] - blocks[f"{axis}_anchor"] for axis in at))
+    blocks = blocks[(blocks["range_m_size"] >= LEAST_SAMPLES) & (blocks["distance_m"] > 0)]
+    return {
+        str(scene): Links(
+            point=rows["point_id"].to_numpy(dtype=int),
+            train=(rows["split"] == "train").to_numpy(),
+            distance_m=rows["distance_m"].to_numpy(),
+            range_m=rows["range_m_mean"].to_numpy(),
+            rssi=rows["rssi_dbm_mean"].to_numpy(),
+            within_range=rows["range_m_var"].to_numpy(),
+            within_rssi=rows["rssi_dbm_var"].to_numpy(),
+            samples=rows["range_m_size"].to_numpy(),
+        )
+        for scene, rows in blocks.groupby("scene", sort=False)
+    }
 
 
 def compare(folder: Path, *, seed: int = 0) -> list[Row]:
@@ -112,7 +126,7 @@ def compare(folder: Path, *, seed: int = 0) -> list[Row]:
 
 
 class Fitted(NamedTuple):
-    """One kind of measurement, fitted on the training links: ``mean = curve(d) + bias + noise``."""
+    """One kind of measurement, fitted on the training links: ``mean = sensor().mean(d) + bias + noise``."""
 
     kind: str
     level: float
@@ -122,27 +136,12 @@ class Fitted(NamedTuple):
     family: str
     spread: float
 
-    def curve(self, d: ndarray) -> ndarray:
-        """What is measured at a distance, without errors."""
-        return d if self.kind == "toa" else self.level - 10 * self.exponent * np.log10(d)
-
-    def slope(self, d: ndarray) -> ndarray:
-        """Its derivative."""
-        return np.ones_like(d) if self.kind == "toa" else -10 * self.exponent / np.log(10) / d
-
-    def information(self, samples: int, common: bool) -> float:
-        """Of a block about a shift of its samples."""
+    def sensor(self, samples: int = 1, *, common: bool = True) -> Sensor:
+        """What measures blocks of so many samples, with one bias for a block or one for each sample."""
         noise, options = Gaussian(0.0, self.noise_std), {"samples": samples, "common": common}
-        sensor = (
-            TimeOfArrival(noise, self.bias, cycles_per_m=1.0, **options)
-            if self.kind == "toa"
-            else Strength(noise, self.bias, exponent=self.exponent, level=self.level, **options)
-        )
-        return float(sensor.information())
-
-    def block_law(self, samples: int) -> Noise:
-        """Law of the error of a block's mean."""
-        return Epoch(Gaussian(0.0, self.noise_std), self.bias, samples, common=True).as_noise()
+        if self.kind == "toa":
+            return TimeOfArrival(noise, self.bias, cycles_per_m=1.0, **options)
+        return Strength(noise, self.bias, exponent=self.exponent, level=self.level, **options)
 
 
 def fit(kind: str, links: Links) -> Fitted:
@@ -196,7 +195,8 @@ def posterior_mean(
     """
     total = np.zeros((len(values[0]), len(prior)))
     for f, z in zip(fitted, values, strict=True):
-        total = total + _log_density(f.block_law(samples), z[:, None] - f.curve(prior))
+        sensor = f.sensor(samples)
+        total = total + _log_density(sensor.epoch_noise()[0], z[:, None] - np.asarray(sensor.mean(prior)))
     weight = np.exp(total - total.max(1, keepdims=True))
     return weight @ prior / weight.sum(1)
 
@@ -214,9 +214,13 @@ def _scene(scene: str, links: Links, seed: int) -> list[Row]:
     for measured, used in (("rss", (rss,)), ("toa", (toa,)), ("fusion", (toa, rss))):
         note = "" if measured == "fusion" else _note(used[0])
         for common, name in ((False, "Cramér-Rao, bias drawn per sample"), (True, "Cramér-Rao, bias of the block")):
-            J = sum(f.information(M, common) * f.slope(d[test]) ** 2 for f in used)
+            sensors = [f.sensor(M, common=common) for f in used]
+            J = sum(float(s.information()) * np.asarray(s.slope(d[test])) ** 2 for s in sensors)
             out.append(Row(scene, measured, name, float(np.sqrt(np.mean(1 / J))), 0.0, int(test.sum()), note))
-        z = tuple(f.curve(drawn) + _draw(f.block_law(M), DRAWS, seed + i) for i, f in enumerate(used))
+        sensors = [f.sensor(M) for f in used]
+        laws = [s.epoch_noise()[0] for s in sensors]
+        errors = [_draw(law, DRAWS, seed + i) for i, law in enumerate(laws)]
+        z = tuple(np.asarray(s.mean(drawn)) + e for s, e in zip(sensors, errors, strict=True))
         squares = (posterior_mean(used, z, prior, M) - drawn) ** 2
         root = float(np.sqrt(squares.mean()))
         error = float(squares.std() / np.sqrt(DRAWS) / (2 * root))
@@ -241,12 +245,13 @@ SHORT = {"exponentially-modified-gaussian": "Gaussian + exponential"}
 def _simple(toa: Fitted, rss: Fitted, links: Links) -> dict[str, dict[str, ndarray]]:
     """Estimates of all links, by kind and name."""
     mean = links.range_m - float(np.mean((links.range_m - links.distance_m)[links.train]))
-    inverted = 10 ** ((rss.level - links.rssi) / (10 * rss.exponent))
+    sensor = rss.sensor()
     near = np.maximum(mean, NEAREST_M)  # where the strength is linearised
-    moved = near + (links.rssi - rss.curve(near)) / rss.slope(near)
-    a, b = toa.spread**-2.0, (rss.slope(near) / rss.spread) ** 2
+    slope = np.asarray(sensor.slope(near))
+    moved = near + (links.rssi - np.asarray(sensor.mean(near))) / slope
+    a, b = toa.spread**-2.0, (slope / rss.spread) ** 2
     return {
-        "rss": {"inverted path loss": inverted},
+        "rss": {"inverted path loss": np.asarray(sensor.inverse(links.rssi))},
         "toa": {"mean range less offset": mean},
         "fusion": {"weighted mean": (a * mean + b * moved) / (a + b)},
     }
