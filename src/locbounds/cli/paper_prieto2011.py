@@ -11,6 +11,7 @@ from locbounds.cli.output import print_json, print_table, status
 def prieto2011(folder: Any, *, samples: int | None, runs: int | None, data: Path | None, seed: int, json: bool) -> None:
     """Run the study, write its files into the folder, print what was found."""
     from locbounds.papers.prieto2011 import densities, outputs
+    from locbounds.papers.prieto2011.statements import remarks
     from locbounds.papers.prieto2011.study import study
     from locbounds.report.tables import csv_text
 
@@ -36,7 +37,7 @@ def prieto2011(folder: Any, *, samples: int | None, runs: int | None, data: Path
         with status("prieto2011: measured distances"):
             measured = real.compare(survey, seed=seed)
         folder.write_text("measured.csv", csv_text(real.COLUMNS, measured))
-    said = outputs.remarks(found)
+    said = remarks(found)
     if json:
         print_json(
             {

@@ -5,8 +5,9 @@ RSS/TOA-based indoor localization systems".
 """
 
 from locbounds.papers.prieto2011.measured import compare
-from locbounds.papers.prieto2011.outputs import fig3, fig3_csv, remarks
+from locbounds.papers.prieto2011.outputs import fig3, fig3_csv
 from locbounds.papers.prieto2011.setting import scenario, trajectory
+from locbounds.papers.prieto2011.statements import remarks
 from locbounds.papers.prieto2011.study import Study, study
 
 __all__ = ["Study", "compare", "fig3", "fig3_csv", "remarks", "scenario", "study", "trajectory"]
