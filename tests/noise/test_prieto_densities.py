@@ -19,7 +19,7 @@ from locbounds.precision import double_precision
 RELATIVE = 1e-10
 L = np.longdouble
 
-pytestmark = pytest.mark.skipif(np.finfo(L).eps > 1e-18, reason="long double is not extended here")
+extended = pytest.mark.skipif(np.finfo(L).eps > 1e-18, reason="long double is not extended here")
 
 
 def legendre(n):
@@ -100,6 +100,7 @@ def case(request):
 log_prob = double_precision(jax.jit(lambda noise, w: noise.log_prob(w)))
 
 
+@extended
 def test_closed_forms_hold_to_ten_digits_next_to_the_edges(case):
     noise, one, two = case
     w = places(one, two)
@@ -147,6 +148,7 @@ def test_the_printed_formulas_of_the_paper():
 MODIFIED = {"one-sided": (0.0, 1.0, 5.0), "nearly Gaussian": (2.0, 3.0, 0.1)}
 
 
+@extended
 @pytest.mark.parametrize("name", MODIFIED)
 def test_exponentially_modified_gaussian_to_ten_digits_in_both_tails(name):
     center, std, scale = MODIFIED[name]
