@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import locbounds as lb
-from locbounds.bounds.weinstein import weiss_weinstein_recursion
+from locbounds.bounds.weinstein import path, path_bound, weiss_weinstein_recursion
 from locbounds.noise.log_coefficient import log_bhattacharyya, log_coefficient
 from locbounds.registry import method
 from locbounds.verdict import Status
@@ -15,6 +15,7 @@ from locbounds.verdict import Status
 ROUNDING = 1e-8  # relative, of the closed form; the same algebra through some hundred operations
 TABLE = 5e-4  # relative, of the logarithm of a tabulated coefficient
 SIGMAS = 4.0
+LOOSE = 1 / 3  # in the root: what the registry says of hard edges
 NOT_VACUOUS = 3.0  # in the mean square, of states that are moved one at a time
 
 
@@ -190,6 +191,92 @@ def test_a_chain_that_is_told_agrees_with_the_dense_gram_matrix_over_all_its_seq
         assert got.position_mse[k] == pytest.approx(float(target @ np.linalg.solve(G, target)), rel=TABLE)
 
 
+def at_scale(monkeypatch, scale):
+    """One common scale of the test shifts in place of a search."""
+    monkeypatch.setattr(path, "SCALES", np.array([scale]))
+    monkeypatch.setattr(path, "LONGEST", 0.0)
+
+
+def test_a_path_bound_of_uniform_noise_is_that_of_sums_over_states_and_measurements(monkeypatch):
+    """z = x + U(-a, a), x normal: test functions, their products and those with x on a grid of (x, w = z - x).
+
+    Sums over x are exact up to rounding (a normal density on an even grid), those over w as well (a and the shifts are
+    multiples of its step). The library integrates products of moved laws over all w; where no z is possible a test
+    function may be left zero, which makes the bound larger.
+    """
+    a, std, step = 1.0, 2.0, 0.02
+    deviation, lengths = 1 / np.sqrt(1 / std**2 + 3 / a**2), np.array([1, 2, 3])
+
+    def log_rho(u):
+        with np.errstate(divide="ignore"):
+            return np.log(np.maximum(1 - np.abs(u[0]) / (2 * a), 0.0))
+
+    def library():
+        return path_bound(np.array([[std]]), log_rho, np.array([[3 / a**2]]), np.array([[std]]), np.array([0]))[0, 0]
+
+    x = np.arange(-20.0, 20.0, 0.2)[:, None]
+
+    def root(w, n):  # of the density at (z, x + h), where z = x + w and h = n steps; w counts steps
+        return np.exp(-((x + n * step) ** 2) / (4 * std**2)) * (np.abs(w - n) < a / step)
+
+    def sums(m):
+        n = m * lengths
+        w = np.arange(-a / step - n[-1] + 0.5, a / step + n[-1])
+        here, moved = root(w, 0), np.stack([root(w, k) - root(w, -k) for k in n])
+        moved = moved[(np.abs(moved) * here).any((1, 2))]  # too long a shift says nothing
+        cross, mass = (x * here * moved).sum((1, 2)), (here**2).sum()
+        whole, inside = (np.einsum("ixw,jxw->ij", f, f) for f in (moved, np.where(here > 0, moved, 0.0)))
+        return [float(cross @ np.linalg.solve(G, cross)) / mass for G in (whole, inside)]
+
+    searched, found = library(), []
+    for m in (3, 10, 14, 20, 32, 45):
+        at_scale(monkeypatch, m * step / deviation)
+        found.append([library(), *sums(m)])
+    got, whole, inside = np.array(found).T
+    np.testing.assert_allclose(got, whole, rtol=1e-9)
+    v = np.linspace(-a, a, 401)[1::2]  # x = z + v
+    p = np.exp(-((np.linspace(-12.0, 12.0, 1201)[:, None] + v) ** 2) / (2 * std**2))
+    variance = (p @ v**2) / p.sum(1) - (p @ v / p.sum(1)) ** 2
+    least = (p.sum(1) @ variance) / p.sum()
+    assert 0.99 * whole.max() < searched < inside.max() < least
+    assert np.sqrt(searched / least) == pytest.approx(0.744, abs=0.005)  # the theory page has both
+    assert np.sqrt(inside.max() / least) == pytest.approx(0.988, abs=0.005)
+
+
+def test_bounds_of_whole_paths_agree_with_a_dense_gram_matrix_over_all_sequences_of_a_chain_that_is_told(monkeypatch):
+    """Every test function by its two signs, every coefficient averaged over the 2^3 sequences."""
+    scale = 0.4
+    at_scale(monkeypatch, scale)
+    got = np.asarray(lb.wwb_recursive(walk(SIGHTS, STICKY), moved="paths").position_mse)
+    T, start = np.array([[0.8, 0.2], [0.4, 0.6]]), np.array([0.7, 0.3])
+    X = np.array([[2.0, *np.sqrt(0.5) * (np.arange(1, 4) <= k)] for k in range(4)])
+    assert got[0] == pytest.approx(4.0)
+    for k in range(1, 4):
+        D = 1.5 * X[1 : k + 1]
+
+        def eta(u, D=D, k=k):
+            total = 0.0
+            for modes in product((0, 1), repeat=k + 1):
+                p = start[modes[0]] * np.prod([T[a, b] for a, b in pairwise(modes)])
+                each = [
+                    max(1 - abs(w) / 6, 0.0) if r else np.exp(-(w**2) / 2)
+                    for w, r in zip(D @ u, modes[1:], strict=True)
+                ]
+                total += p * np.prod(each)
+            return np.exp(-(u @ u) / 8) * total
+
+        moves = []
+        for guess in (0.2, 1.0, 10.0):
+            V = np.linalg.solve(np.eye(4) + guess / 0.25 * D.T @ D, X[k])
+            moves += [length * scale * V / np.sqrt(X[k] @ V) for length in (1.0, 2.0, 3.0)]
+        signs = list(product((1, -1), repeat=2))
+        G = np.array([[sum(a * b * eta(a * u - b * v) for a, b in signs) for v in moves] for u in moves])
+        cross = np.array([eta(u) * (u @ X[k]) for u in moves])
+        d = np.sqrt(np.diag(G))
+        solved = np.linalg.lstsq(G / np.outer(d, d), cross / d, rcond=1e-7)[0]
+        assert got[k] == pytest.approx(float(cross / d @ solved), rel=4 * TABLE)
+
+
 def grid_mmse(model, densities, told, runs=200, seed=0):
     """Mean of the posterior variance at step 3 over draws, by a filter on a grid of places (and modes)."""
     rng = np.random.default_rng(seed)
@@ -242,6 +329,7 @@ def test_the_bound_is_below_the_minimum_mean_square_error_and_not_far(noises, de
     bound = lb.wwb_recursive(model)
     mmse, error = grid_mmse(model, densities, told)
     assert bound.position_mse[3] < mmse + SIGMAS * error
+    assert bound.position_mse[3] > (1 - LOOSE) ** 2 * (mmse - SIGMAS * error)
     states = lb.wwb_recursive(model, moved="states")
     assert mmse / NOT_VACUOUS < states.position_mse[3] <= bound.position_mse[3]
     scale = float(states.diagnostics["scale"][3])
