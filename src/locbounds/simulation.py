@@ -159,7 +159,7 @@ def simulate_block(scenario: Scenario | JumpMarkov, *, seed: int, block: int) ->
     """One block of :data:`RUNS_PER_BLOCK` tracks of :func:`simulate`: for more runs than fit into memory.
 
     >>> import locbounds as lb
-    >>> scenario = lb.papers.fritsche2013.scenario(steps=10)
+    >>> scenario = lb.papers.fritsche2013.scenario(steps=3)
     >>> few = lb.simulate(scenario, runs=3, seed=1).states
     >>> bool(np.all(simulate_block(scenario, seed=1, block=0).states[:3] == few))
     True
