@@ -82,6 +82,20 @@ def test_files_tables_and_pictures(tmp_path):
         assert words in done.output
 
 
+@pytest.mark.parametrize(("given", "wanted"), [([], [5e-3, 1e-2]), (["--rtol", "0.002"], [2e-3, 2e-3])])
+def test_the_precision_asked_for_is_that_of_the_cells(monkeypatch, given, wanted):
+    asked = []
+
+    def ezzb(plan, *, rtol):
+        asked.append(rtol)
+        return lb.ezzb(plan, rtol=0.05)
+
+    monkeypatch.setattr("locbounds.static.over_prior.load", lambda entry: ezzb)
+    done = run(HALL, "--grid", "3", "--cells", "1", "--methods", "ezzb", *given)
+    assert done.exit_code == 0, done.output
+    assert asked == wanted
+
+
 def test_json_and_netcdf_say_the_same(tmp_path):
     import xarray
 

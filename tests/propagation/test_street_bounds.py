@@ -281,9 +281,10 @@ def test_bad_input_ends_with_two_and_leaves_nothing(files):
     assert done.exit_code == 2
     assert "error: city.toml: measure.nearest is 9, and there are 4 anchors" in done.output
     assert "remedy: Add anchors, or give measure.nearest a number from 2 to 4" in done.output
-    done = run(files, TEXT, "--grid", "50")
-    assert done.exit_code == 2
-    assert "error: --grid is for plan files" in done.output
+    for option in (("--grid", "50"), ("--grid", "101"), ("--rtol", "0.01")):  # 101 is what is left out, too
+        done = run(files, TEXT, *option)
+        assert done.exit_code == 2
+        assert f"error: {option[0]} is for plan files" in done.output
     assert not (files / "out").exists()
 
 

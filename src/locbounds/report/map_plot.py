@@ -9,9 +9,10 @@ from locbounds.axes import Float, ndarray
 from locbounds.plan import Plan
 from locbounds.registry import method
 from locbounds.report.plan_view import draw_anchors, draw_outline, frame, scale_bar
-from locbounds.static.cells import Cell, outline_of, rmse_of
+from locbounds.static.cells import Cell, outline_of
 from locbounds.static.crlb import REASONS
 from locbounds.static.maps import AccuracyMap, quantile_name
+from locbounds.static.over_prior import rmse_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
