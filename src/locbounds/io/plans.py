@@ -190,7 +190,7 @@ def _build(file: PlanFile, folder: Path) -> PlanMap:
         with at("prior"):
             prior = _prior(file.prior, dim)
     plan, left_out, notes = _measured(file, positions)
-    plan = plan.replace(title=file.title, prior=prior, area=None)
+    plan = plan.replace(title=file.title, prior=prior)
     few = plan.too_few()
     if few and prior is not None:
         notes = (*notes, f"no Cramér-Rao bound: {few}; the numbers over the prior rest on it")

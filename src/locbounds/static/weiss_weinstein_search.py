@@ -122,9 +122,9 @@ def longest(support: Support, pattern: ndarray) -> float:
 
 def equal_lengths(
     support: Support, law: PairLaw, scales: Sequence[float], *, form: str = "support", n: int = NODES,
-    lengths: ndarray | None = None, pattern: ndarray | None = None,
+    lengths: ndarray | None = None,
 ) -> tuple[list[Best], Swept]:  # fmt: skip
-    """Supremum over the length h of the test vectors ``h * pattern`` (by default h I), for several noise levels.
+    """Supremum over the length h of the test vectors ``h I``, for several noise levels.
 
     Parameters
     ----------
@@ -132,10 +132,8 @@ def equal_lengths(
         ``"support"``, or ``"printed"`` for the chapter's (18).
     lengths
         Swept beside those that are always swept, m.
-    pattern
-        [space, points].
     """
-    pattern = np.eye(support.space) if pattern is None else pattern
+    pattern = np.eye(support.space)
     grams = FORMS[form]
     top = longest(support, pattern)
     coarse = max(3, 2 * n // 3)  # to search on
