@@ -231,8 +231,7 @@ def at_vectors(support: Support, law: PairLaw, H: ndarray, form: str, n: int) ->
     """The bound of given test vectors, on two sets of nodes."""
     grams = FORMS[form]
     coarse, fine = (kernel.bound_matrices(H, grams(support, law, [H], k, [1.0])[0])[0] for k in (n, n + n // 2 + 1))
-    change = np.sqrt(np.trace(fine) / max(np.trace(coarse), 1e-300)) - 1
-    return Best(fine, H, float(abs(change)) if np.trace(fine) > 0 else 0.0)
+    return Best(fine, H, relative_change(coarse, fine))
 
 
 def diagonal(support: Support, law: PairLaw, start: Best, form: str, n: int) -> Best:
