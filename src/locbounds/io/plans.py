@@ -19,7 +19,16 @@ from locbounds.io.schema import NlosTable
 from locbounds.io.toml import parse_toml, read_toml
 from locbounds.noise import Gaussian, Noise
 from locbounds.plan import FLAT, Plan, aoa, rss, soft, tdoa, toa
-from locbounds.priors import GaussianPrior, PositionPrior, PriorMixture, Prism, UniformBox, UniformDisc, UniformPolygon
+from locbounds.priors import (
+    GaussianPrior,
+    PositionPrior,
+    PriorMixture,
+    Prism,
+    UniformBox,
+    UniformDisc,
+    UniformPolygon,
+    UniformPrior,
+)
 
 
 class PlanMap(NamedTuple):
@@ -28,7 +37,7 @@ class PlanMap(NamedTuple):
     Attributes
     ----------
     plan : Plan
-    area : PositionPrior
+    area : UniformPrior
         Uniform law of the plane over the area of the map.
     height_m : float or None
         In 3-D: height of the map.
@@ -43,7 +52,7 @@ class PlanMap(NamedTuple):
     """
 
     plan: Plan
-    area: PositionPrior
+    area: UniformPrior
     height_m: float | None
     heights_m: tuple[float, float] | None
     names: tuple[str, ...]
@@ -128,7 +137,7 @@ def _build(file: PlanFile, folder: Path) -> PlanMap:
     return PlanMap(plan, area, height, heights, tuple(positions), places, left_out, notes)
 
 
-def _region(shape: Shape, path: str) -> PositionPrior:
+def _region(shape: Shape, path: str) -> UniformPrior:
     """A region of the plane, or a box."""
     with at(path):
         if shape.outline_m is not None:
@@ -144,7 +153,7 @@ def _region(shape: Shape, path: str) -> PositionPrior:
         return UniformBox(shape.low_m, shape.high_m)
 
 
-def _area(area: AreaSection, dim: int) -> tuple[PositionPrior, float | None, PositionPrior | None]:
+def _area(area: AreaSection, dim: int) -> tuple[UniformPrior, float | None, PositionPrior | None]:
     """Region of the plane, height of the map, and the prior that is uniform over it."""
     region, height = _region(area, "area"), area.height_m
     number: Any = height

@@ -14,7 +14,7 @@ import numpy as np
 from locbounds.axes import ndarray
 from locbounds.errors import InputError
 from locbounds.plan import Plan
-from locbounds.priors import PositionPrior, PriorMixture, Prism, UniformBox, UniformPolygon
+from locbounds.priors import PositionPrior, PriorMixture, Prism, UniformBox, UniformPolygon, UniformPrior
 from locbounds.static.over_prior import RTOL, Numbers, over_prior
 
 PER_CELL = ("wwb", "ezzb", "mmse")  # what is worth a map: bcrb never exists for a cell
@@ -22,8 +22,15 @@ CELL_RTOL = 2 * RTOL
 MOST_CELLS = 64
 
 
-def cells_of(area: PositionPrior, n: int, height: tuple[float, float] | None = None) -> list[tuple[Any, PositionPrior]]:
-    """The area cut into squares, n along the longer side: corners [2, 2] of each and the uniform law on its part.
+def cells_of(
+    area: UniformPrior, n: int, height: tuple[float, float] | None = None
+) -> list[tuple[ndarray, Any, PositionPrior]]:
+    """The area cut into squares, n along the longer side.
+
+    Returns
+    -------
+    list
+        Corners [2, 2] of each, its part of the area as a Shapely region, and the uniform law on that.
 
     Examples
     --------
@@ -36,28 +43,16 @@ def cells_of(area: PositionPrior, n: int, height: tuple[float, float] | None = N
     low, high = (np.asarray(corner)[:2] for corner in area.bounds())
     side = float((high - low).max()) / n
     counts = np.maximum(1, np.ceil((high - low) / side - 1e-9).astype(int))
-    whole = outline_of(area)
     out = []
     for j in range(counts[1]):
         for i in range(counts[0]):
             a = low + side * np.array([i, j])
             b = np.minimum(a + side, high)
-            part = whole.intersection(shapely.box(*a, *b))
+            part = area.shape.intersection(shapely.box(*a, *b))
             law = _law(part, least=1e-3 * side**2)
             if law is not None:
-                out.append((np.stack([a, b]), law if height is None else Prism(law, *height)))
+                out.append((np.stack([a, b]), part, law if height is None else Prism(law, *height)))
     return out
-
-
-def outline_of(area: PositionPrior) -> Any:
-    """The Shapely polygon of an area; a disc as a polygon of 128 corners."""
-    import shapely
-
-    if isinstance(area, UniformBox):
-        return shapely.box(*area.low[:2], *area.high[:2])
-    if isinstance(area, UniformPolygon):
-        return area.shape
-    return shapely.Point(*area.center).buffer(float(area.radius), quad_segs=32)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def _law(part: Any, least: float) -> PositionPrior | None:
@@ -78,15 +73,16 @@ def _law(part: Any, least: float) -> PositionPrior | None:
 
 
 class Cell(NamedTuple):
-    """A cell of the area: its corners [2, 2] in metres, and the numbers of each method there."""
+    """A cell: its corners [2, 2] in metres, its part of the area as a Shapely region, the numbers of each method."""
 
     corners: ndarray
+    part: Any
     found: Numbers
 
 
 def per_cell(
     plan: Plan,
-    area: PositionPrior,
+    area: UniformPrior,
     ids: Sequence[str],
     *,
     cells: int,
@@ -119,10 +115,10 @@ def per_cell(
     parts = cells_of(area, cells, height)
     out = []
     progress(0, len(parts) * len(ids))
-    for k, (corners, law) in enumerate(parts):
+    for k, (corners, part, law) in enumerate(parts):
         found: Numbers = {}
         for j, id in enumerate(ids):
             found |= over_prior(plan.replace(prior=law), [id], rtol=rtol, seed=seed)
             progress(k * len(ids) + j + 1, len(parts) * len(ids))
-        out.append(Cell(corners, found))
+        out.append(Cell(corners, part, found))
     return out

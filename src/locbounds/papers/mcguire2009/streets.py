@@ -333,8 +333,8 @@ def fig7_figure() -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.patches import PathPatch
 
-    from locbounds.report.city_plot import draw_buildings, draw_paths, outline
-    from locbounds.report.plan_view import draw_anchors
+    from locbounds.report.city_plot import draw_buildings, draw_paths
+    from locbounds.report.plan_view import draw_anchors, outline
 
     cell, places = stretch()
     whole = city(3)
