@@ -86,7 +86,7 @@ SMOOTH = {"std": 1e-2, "anchor": 1e-1, "intensity": 1e-3, "prior_std": 1e-2}  # 
 AT = {"std": 3.0, "anchor": -60.0, "intensity": 0.4, "prior_std": 8.0, "stay": 0.85}
 
 
-@pytest.fixture(scope="module", params=BOUNDS)
+@pytest.fixture(scope="module", params=["bcrb", pytest.param("enumer", marks=pytest.mark.slow)])
 def gradients(request):
     """Gradients of a bound on the draws of several seeds, with respect to all of AT."""
     with jax.enable_x64(True):
@@ -128,11 +128,11 @@ def test_gradient_with_respect_to_mixture_weights_is_that_of_the_expectation():
 
 def test_a_plain_call_inside_a_users_jit_is_a_constant():
     scenario = one_link()
-    plain = lb.bcrb(scenario, rtol=5e-3).mean_position_rmse()
+    plain = lb.bcrb(scenario, rtol=2e-2).mean_position_rmse()
 
     @jax.jit
     def double(x):
-        return x * lb.bcrb(scenario, rtol=5e-3).mean_position_rmse()
+        return x * lb.bcrb(scenario, rtol=2e-2).mean_position_rmse()
 
     assert double(2.0) == pytest.approx(2 * plain, rel=1e-6)  # the user's own single precision
 
