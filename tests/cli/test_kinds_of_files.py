@@ -9,6 +9,7 @@ import locbounds as lb
 from locbounds.cli.app import app
 from locbounds.errors import InputError
 from locbounds.registry import METHODS
+from refusals import refused
 
 CITY = """
 format = 1
@@ -23,12 +24,6 @@ A = { position_m = [0, 0] }
 
 def run(*arguments):
     return CliRunner().invoke(app, list(arguments))
-
-
-def refused(done, *words):
-    assert done.exit_code == 2, done.output
-    assert "\nremedy: " in done.stderr
-    assert all(word in done.stderr for word in words), done.stderr
 
 
 @pytest.fixture(autouse=True)

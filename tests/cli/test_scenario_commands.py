@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from locbounds.cli.app import app
 from locbounds.io.scenario_file import load
 from locbounds.papers import fritsche2013
+from refusals import refused
 
 
 @pytest.fixture(autouse=True)
@@ -24,17 +25,6 @@ def run(*arguments):
 
 def files(folder):
     return sorted(str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file())
-
-
-def refused(done, *words):
-    """Exit code 2, cause and remedy on stderr, nothing on stdout, no traceback."""
-    assert done.exit_code == 2, done.output
-    assert done.stdout == ""
-    assert done.stderr.startswith("error: ")
-    assert "\nremedy: " in done.stderr
-    assert "Traceback" not in done.stderr
-    for word in words:
-        assert word in done.stderr
 
 
 def test_new_writes_the_papers_scenario(tmp_path):

@@ -6,26 +6,12 @@ import numpy as np
 import pytest
 
 import locbounds as lb
+from hall import HALL, PLACES
 from locbounds.io import plans
 from locbounds.io.plan_example import PLAN
 
-HALL = """
-format = 1
-title = "Hall"
-[area]
-low_m = [0, 0]
-high_m = [40, 20]
-[links]
-measure = "toa"
-los = { std_m = 2 }
-[anchors]
-a = { position_m = [0, 0] }
-b = { position_m = [40, 0] }
-c = { position_m = [20, 20] }
-"""
 read_plan: Any = plans.read_plan  # what a file holds is of one kind or another
 read_text: Any = plans.read_text
-PLACES = np.array([[0.0, 0.0], [40.0, 0.0], [20.0, 20.0]])
 THERE = np.array([[11.0, 7.0], [30.0, 15.0]])
 
 
@@ -85,6 +71,54 @@ def test_anchors_from_a_table(tmp_path):
     (tmp_path / "plan.toml").write_text(text)
     read = read_plan(tmp_path / "plan.toml")
     np.testing.assert_array_equal(read.positions, PLACES)
+
+
+@pytest.mark.parametrize("section", ["area", "links"])
+def test_a_table_of_anchors_named_below_a_section(tmp_path, section):
+    (tmp_path / "anchors.csv").write_text("anchor_id,x_m,y_m\na,0,0\nb,40,0\nc,20,20\n")
+    text = HALL.partition("[anchors]")[0].replace(f"[{section}]", f'[{section}]\nanchors_csv = "anchors.csv"')
+    np.testing.assert_array_equal(read_text(text, folder=tmp_path).positions, PLACES)
+
+
+@pytest.mark.parametrize(
+    ("los", "words"),
+    [
+        ("std_deg = -3", ["links.los.std_deg is -3, but must be positive", "std_deg: standard deviation in degrees"]),
+        ("std_rad = -0.1", ["links.los.std_rad is -0.1, but", "std_rad: standard deviation in radians"]),
+        ("mean_deg = 4", ["links.los has no std_deg", "Add std_deg: standard deviation in degrees"]),
+        ("std_deg = '3'", ["links.los.std_deg is '3', not a number"]),
+        ("stddev_deg = 3", ["unknown key links.los.stddev_deg = 3", "Did you mean std_deg?"]),
+        ("std_db = 3", ["unknown key links.los.std_db = 3", "Did you mean std_rad or std_deg?", "are in radians"]),
+        ("std_deg = 3, std_rad = 0.05", ["links.los has std_deg and std_rad", "Keep one"]),
+        ("weights = [0.5, 0.5], means_deg = [0, 5], stds_deg = [1, -2]", ["links.los.stds_deg is -2"]),
+        (
+            "mixture = [{ share = 0.9, std_rad = 0.1 }, { share = 0.1, std_deg = 0 }]",
+            ["links.los.mixture.1.std_deg is 0, but", "in degrees"],
+        ),
+    ],
+)
+def test_errors_about_angles_speak_of_what_is_written(los, words):
+    with pytest.raises(lb.InputError) as error:
+        read_text(changed(('"toa"', '"aoa"'), ("std_m = 2", los)), source="hall.toml")
+    for word in ("hall.toml: ", *words):
+        assert word in str(error.value)
+    assert "_m" not in str(error.value)
+
+
+def test_degrees_in_every_kind_of_table():
+    narrow = changed(('"toa"', '"aoa"'), ("std_m", "std_deg"))
+    own = changed(("[20, 20] }", "[20, 20], los = { std_deg = 5 } }"), text=narrow)
+    same(own, lb.aoa(PLACES, np.radians([2.0, 2.0, 5.0])))
+    parts = "mixture = [{ share = 0.9, std_rad = 0.1 }, { share = 0.1, mean_deg = 9, std_deg = 18 }]"
+    rare = "outlier = { share = 0.1, std_deg = 20 }\n[anchors]"
+    w = np.linspace(-1, 1, 7)
+    for text, law in (
+        (changed(("std_deg = 2", parts), text=narrow), ((0.9, 0.1), (0.0, 9.0), (np.degrees(0.1), 18.0))),
+        (changed(("[anchors]", rare), text=narrow), ((0.9, 0.1), (0.0, 0.0), (2.0, 20.0))),
+    ):
+        shares, means, deviations = law
+        expected = lb.GaussianMixture(shares, np.radians(means), np.radians(deviations)).log_prob(w)
+        np.testing.assert_allclose(read_text(text).plan.groups[0].noises[0].log_prob(w), expected, rtol=1e-6)
 
 
 def test_areas_and_priors():
@@ -183,7 +217,10 @@ def test_errors_name_key_value_and_remedy(pairs, words):
 @pytest.mark.parametrize(
     ("prior", "words"),
     [
-        ("mixture = [{ share = 0.5, center_m = [0, 0], radius_m = 2 }]", ["sum to 0.5", "Shares must sum to one"]),
+        (
+            "mixture = [{ share = 0.5, center_m = [0, 0], radius_m = 2 }]",
+            ["prior: mixture weights are [0.5]", "sum to one"],
+        ),
         ("position_m = [0, 0]\nposition_std_m = inf", ["position_std_m"]),
         ("position_m = [0, 0]\nposition_std_m = 0", ["position_std_m"]),
         ("position_m = [0, 0]\nposition_std_m = [[1, 2], [2, 1]]", ["prior"]),

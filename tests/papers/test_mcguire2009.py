@@ -135,6 +135,20 @@ def test_statements_follow_the_numbers():
     one, two = (study.statements({"fig3": rows("ToA R_BS=15 m", e)})[0].verdict for e in (2.0, 1.75))
     assert (one, two) == (HOLDS, PARTLY)
     assert study.statements({"fig3": rows("ToA R_BS=15 m", 2.0)})[1].verdict == HOLDS
+    assert study.statements({"fig3": rows("ToA R_BS=15 m", 1.6)})[0].verdict == FAILS
+    assert study.statements({"fig3": rows("ToA R_BS=15 m", 1.6)})[0].why == (
+        "form as printed: at no noise level; with the support: at no noise level"
+    )
+    tight = [study.statements({"fig5": rows("RSS R_BS=5 m", e)})[1] for e in (2.4, 1.7)]
+    assert [t.verdict for t in tight] == [HOLDS, PARTLY]  # WWB has 1.8 of 2.5, just enough
+    loose = [r._replace(rmse_m=0.1) if r.method == "WWB" else r for r in rows("RSS R_BS=5 m", 1.7)]
+    assert study.statements({"fig5": loose})[1].verdict == FAILS
+    low_noise = [
+        [r._replace(rmse_m=share[r.sigma] * 2.5 * r.sigma) if r.method == "WWB as printed" else r
+         for r in rows("ToA R_BS=15 m", 2.0)]
+        for share in ({1.0: 0.9, 2.0: 0.6}, {1.0: 0.7, 2.0: 0.6}, {1.0: 0.6, 2.0: 0.7})
+    ]  # fmt: skip
+    assert [study.statements({"fig3": r})[2].verdict for r in low_noise] == [HOLDS, PARTLY, FAILS]
     other = [r._replace(rmse_m=0.1) if r.method == "BCRB" else r for r in rows("ToA R_BS=15 m", 2.0)]
     assert study.statements({"fig3": other})[1].verdict == FAILS
 

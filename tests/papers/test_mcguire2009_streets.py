@@ -44,7 +44,7 @@ def test_the_layout():
 
 
 def test_the_texts_statements():
-    found = study.statements(24)
+    found = study.sight_shares(24)
     assert found.nearest_los == 1.0
     assert found.corners == 1.0
     x = np.linspace(300, 320, 2001)  # sight of a second station: only inside the crossing

@@ -13,6 +13,7 @@ from locbounds.cli.app import app
 from locbounds.propagation import City, LinkTable
 from locbounds.static.street_map import cell_bounds, street_crlb, street_map
 from locbounds.static.street_raster import raster_ezzb, raster_mmse, raster_wwb, street_raster
+from refusals import refused
 
 HALVED = 4.0  # the error of the midpoint rule falls by four when the step is halved
 
@@ -278,13 +279,14 @@ def test_a_cell_that_no_anchor_reaches_is_left_out():
 
 def test_bad_input_ends_with_two_and_leaves_nothing(files):
     done = run(files, TEXT.replace("std_m = 3", "std_m = 3\nnearest = 9"))
-    assert done.exit_code == 2
-    assert "error: city.toml: measure.nearest is 9, and there are 4 anchors" in done.output
-    assert "remedy: Add anchors, or give measure.nearest a number from 2 to 4" in done.output
-    done = run(files, TEXT, "--grid", "50")
-    assert done.exit_code == 2
-    assert "error: --grid is for plan files" in done.output
-    assert not (files / "out").exists()
+    refused(
+        done,
+        "error: city.toml: measure.nearest is 9, and there are 4 anchors",
+        "remedy: Add anchors, or give measure.nearest a number from 2 to 4",
+    )
+    for option in (("--grid", "50"), ("--grid", "101"), ("--rtol", "0.01")):  # 101 is what is left out, too
+        done = run(files, TEXT, *option)
+        refused(done, f"error: {option[0]} is for plan files", unwritten=files / "out")
 
 
 def test_courtyards_out_of_reach(files, capsys):

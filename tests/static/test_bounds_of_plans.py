@@ -1,5 +1,7 @@
 """Bounds and estimators of plans: order, verdicts, searches, invariances."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -9,6 +11,9 @@ import static_by_hand as by_hand
 from locbounds.papers.mcguire2009 import CASES
 from locbounds.registry import METHODS, method
 from locbounds.static.barankin import barankin_matrix
+from locbounds.static.cells import per_cell
+from locbounds.static.over_prior import OVER_PRIOR, over_prior
+from locbounds.static.tightest import choose
 from locbounds.verdict import Status
 
 ANCHORS = np.array([[0.0, 15.0], [-13.0, -7.5], [13.0, -7.5]])
@@ -48,6 +53,26 @@ def test_no_valid_bound_is_above_the_least_error(name):
     assert rmse(found.runner_up) <= rmse(found.best)
     assert found.best.name in found.reason
     assert least.efficiency(found.best).value <= 1 + 8 * least.relative_stderr()
+
+
+def test_a_runner_up_of_zero_is_no_division_by_zero():
+    found = lb.tightest(with_prior(NEAR), rtol=1e-2)
+    nothing = dataclasses.replace(found.runner_up, position_mse=np.zeros(1))
+    again = choose({r.id: r for r in (nothing, found.best)})
+    assert again.best is found.best
+    assert again.reason.endswith(f"m, above {nothing.name} (0.000 m)")
+
+
+def test_a_user_error_is_no_property_of_a_method():
+    plan = with_prior(DISC)
+    with pytest.raises(lb.InputError, match="rtol is 5"):
+        over_prior(plan, ["ezzb"], rtol=5.0)
+    with pytest.raises(lb.InputError, match="rtol is 5"):
+        per_cell(plan, DISC, ["ezzb"], cells=1, rtol=5.0)
+    with pytest.raises(lb.InputError, match="coordinates"):
+        per_cell(plan, DISC, ["ezzb"], cells=1, height=(0.0, 2.0))
+    every = over_prior(plan.replace(prior=None), OVER_PRIOR)
+    assert {id: type(r).__name__ for id, r in every.items()} == dict.fromkeys(OVER_PRIOR, "Refusal")
 
 
 def test_more_tests_are_tighter_and_the_printed_form_is_looser():

@@ -52,6 +52,23 @@ def test_each_posterior_of_hard_edges_is_that_of_a_grid():
     assert mine.mean() == pytest.approx(theirs.mean(), rel=0.02)
 
 
+@pytest.mark.parametrize(("half_width_m", "some"), [(3.0, False), (1.0, True)])
+def test_draws_that_no_node_explains_are_counted_and_told(half_width_m, some):
+    """With coarse nodes: none of them lies where all three ranges are possible, and the error found is too small."""
+    noises = [lb.Uniform(-half_width_m, half_width_m)] * 3
+    its = lb.toa(STATIONS, noises, prior=lb.GaussianPrior([0, 0], STD**2 * np.eye(2)))
+    found = lb.mmse(its, draws=32, rtol=0.1)
+    law = likelihood(its)
+    drawn = draw(its, law, 2, REPLICATES, 0)
+    nodes = nodes_of(its, law, 60)
+    gap = drawn.measured[1][:, None] - nodes.features[1]
+    none = ~np.any(np.all(np.abs(gap) <= half_width_m, axis=2), axis=1)
+    np.testing.assert_array_equal(posterior(law, nodes, drawn).missed, none)
+    missed = found.diagnostics["missed"]
+    assert (missed > 0) == some
+    assert any(f"no node is possible for {missed} of 32 draws" in w for w in found.verdict.warnings) == some
+
+
 def test_unknown_clock_with_hard_edges_is_refused():
     """Not taken for a known clock."""
     unknown = plan().replace(clock_std_m=np.inf)

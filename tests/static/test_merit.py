@@ -99,6 +99,30 @@ def test_no_bound_is_an_infinite_error_not_a_nan():
     assert np.isposinf(merit.error_ellipse(C).semi_axes_m[0]).all()
 
 
+FIGURES = (
+    merit.mse, merit.rmse, merit.mde, merit.cep, merit.error_quantile, lambda C: merit.error_ellipse(C).semi_axes_m,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_what_is_no_covariance_is_refused(figure):
+    turned = np.array([[0.6, -0.8], [0.8, 0.6]])
+    for wrong, words in (
+        (np.diag([4.0, -100.0]), "negative variance"),
+        (turned @ np.diag([4.0, -1e-6]) @ turned.T, "negative variance"),
+        (np.diag([4.0, 1.0, -1.0]), "negative variance"),
+        (np.diag([-4.0]), "negative variance"),
+        (np.diag([np.nan, 1.0]), "NaN"),
+    ):
+        with pytest.raises(lb.InputError, match=words):
+            figure(wrong)
+        with pytest.raises(lb.InputError, match=words):
+            figure(np.stack([np.full(wrong.shape, np.inf), np.eye(len(wrong)), wrong]))
+    for rounded in (turned @ np.diag([4.0, -1e-12]) @ turned.T, np.diag([4.0, 0.0, -1e-12]), np.zeros((2, 2))):
+        assert np.isfinite(figure(rounded)).all()
+        assert np.isposinf(np.atleast_1d(figure(np.full(rounded.shape, np.inf)))[0])
+
+
 @pytest.mark.parametrize("share", [0.0, 1.0, -1.0, np.nan])
 def test_shares_that_are_none(share):
     with pytest.raises(lb.InputError, match="share of errors"):

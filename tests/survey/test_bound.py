@@ -1,8 +1,11 @@
 """The rigorous bound: never above the exact least error, equal to brute force, valid with any matching."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
+from scipy.spatial.transform import Rotation
 from scipy.special import ndtr
 
 from locbounds.survey import Fingerprints, printed_mse, survey_bound, survey_candidates, survey_model
@@ -61,6 +64,7 @@ def test_certificates_are_injections_of_pairs_far_enough_apart():
     confusions = ndtr(-cdist(model.whitened, model.whitened) / 2)
     for name, part in survey_bound(model).axes.items():
         x = model.position_m[:, "xy".index(name)]
+        assert part.matchings
         for m in part.matchings:
             assert len(set(m.left)) == len(m.left) == len(set(m.right))
             assert (x[m.right] - x[m.left] >= m.distance_m).all()
@@ -104,7 +108,16 @@ def test_candidates_and_auctions_give_a_lower_value_and_an_upper_one(scale):
     assert nearly.mse_m2 > 0.95 * exact.mse_m2
 
 
-def test_a_rotation_of_all_positions_does_not_change_the_length_and_moves_with_the_noise():
+def test_a_rotation_of_all_positions_does_not_change_the_length():
+    model = hall(60)
+    turn = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
+    turned = dataclasses.replace(model, position_m=model.position_m @ turn.T + [5.0, -3.0, 2.0])
+    here, there = survey_bound(model), survey_bound(turned)
+    assert there.length.mse_m2 == pytest.approx(here.length.mse_m2, rel=1e-9)
+    assert there.axes["x"].mse_m2 != pytest.approx(here.axes["x"].mse_m2, rel=1e-3)
+
+
+def test_the_bound_grows_with_the_noise():
     model = hall(60)
     low, high = survey_bound(model, scale=0.5), survey_bound(model, scale=2.0)
     assert low.mse_m2 < high.mse_m2

@@ -115,9 +115,13 @@ def test_the_printed_formula_is_the_sum_over_sorted_distances_by_hand():
     worst = np.array([[np.max(np.where(apart[i] >= x / 2, p[i], 0)) for i in range(6)] for x in h[::100]])
     coarse = np.trapezoid(h[::100] * worst.mean(axis=1), h[::100]) / 2
     assert printed_mse(model) == pytest.approx(coarse, rel=2e-3)  # the step of the numerical integral
-    assert printed_mse(lb.survey_model(Fingerprints.at(model.position_m, model.mean), noise_db=1.0)) == pytest.approx(
-        printed_mse(lb.survey_model(Fingerprints.at(model.position_m, model.mean), noise_db=1.0), squared=True)
-    )
+
+    def at_noise(noise_db):
+        return lb.survey_model(Fingerprints.at(model.position_m, model.mean), noise_db=noise_db)
+
+    as_printed = printed_mse(at_noise(2.0), squared=True)  # sigma^2 = 4 in the place of sigma
+    assert as_printed == pytest.approx(printed_mse(at_noise(4.0)), rel=1e-9)
+    assert as_printed > 1.1 * printed_mse(at_noise(2.0))
 
 
 def test_a_study_holds_together():

@@ -10,7 +10,7 @@ from locbounds.cli.check import check
 from locbounds.cli.explain import explain
 from locbounds.cli.failures import Program
 from locbounds.cli.fit import fit
-from locbounds.cli.map import map_command
+from locbounds.cli.map import MapCommand, map_command
 from locbounds.cli.new import new
 from locbounds.cli.paper import paper
 from locbounds.cli.score import score
@@ -60,7 +60,7 @@ app.command()(track)
 app.command()(simulate)
 app.command()(score)
 app.command()(fit)
-app.command("map")(map_command)
+app.command("map", cls=MapCommand)(map_command)
 app.command()(survey)
 app.command()(paper)
 app.command()(explain)

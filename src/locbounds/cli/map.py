@@ -1,17 +1,24 @@
 """``locbounds map``: what accuracy is possible over an area."""
 
-import inspect
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from locbounds.cli.options import ForceOption, JsonOption, OutOption, SeedOption, default_out
 
-DEFAULT_METHODS = "bcrb,wwb,ezzb,mmse"
+OF_PLANS = ("grid", "cells", "methods", "share", "weights", "rtol")  # options that a city file does not take
+
+
+class MapCommand(TyperCommand):
+    """Hands its function the context that the function's annotation promises, not the base class of it."""
+
+    context_class = typer.Context
 
 
 def map_command(
+    ctx: typer.Context,
     plan: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="Plan file or city file.", show_default=False)],
     grid: Annotated[int, typer.Option("--grid", metavar="N", help="Points along the longer side.")] = 101,
     cells: Annotated[
@@ -20,7 +27,7 @@ def map_command(
     methods: Annotated[
         str,
         typer.Option("--methods", metavar="LIST", help="Beside crlb: of bcrb, wwb, ezzb, mmse, ml, ls; or none."),
-    ] = DEFAULT_METHODS,
+    ] = "bcrb,wwb,ezzb,mmse",
     share: Annotated[
         float, typer.Option("--share", metavar="P", help="Of the error quantile that is tabulated beside the CEP.")
     ] = 0.67,
@@ -33,7 +40,13 @@ def map_command(
             "(reference deviation / deviation)^2.",
         ),
     ] = None,
-    rtol: Annotated[float, typer.Option("--rtol", help="Relative precision of the Bayesian numbers.")] = 5e-3,
+    rtol: Annotated[
+        float | None,
+        typer.Option(
+            "--rtol",
+            help="Relative precision of the Bayesian numbers, over the prior and per cell; left out: 0.005 and 0.01.",
+        ),
+    ] = None,
     out: OutOption = None,
     seed: SeedOption = 0,
     json: JsonOption = False,
@@ -56,7 +69,7 @@ def map_command(
     if kind_of_file(plan) == "city":
         from locbounds.cli.map_city import map_city
 
-        _refuse_plan_options(grid=grid, cells=cells, methods=methods, share=share, weights=weights, rtol=rtol)
+        _refuse_plan_options(ctx)
         map_city(plan, default_out(plan, out), seed=seed, json=json, force=force)
         return
     map_plan(
@@ -74,12 +87,13 @@ def map_command(
     )
 
 
-def _refuse_plan_options(**given: Any) -> None:
+def _refuse_plan_options(ctx: typer.Context) -> None:
     """Raise an InputError if an option was given that a city file does not take."""
     from locbounds.errors import InputError
 
-    for name, parameter in inspect.signature(map_plan).parameters.items():
-        if name in given and given[name] != parameter.default:
+    for name in OF_PLANS:
+        source = ctx.get_parameter_source(name)
+        if source is not None and source.name != "DEFAULT":
             raise InputError(f"--{name} is for plan files, this is a city file", "Its keys say what is computed")
 
 
@@ -87,15 +101,15 @@ def map_plan(
     path: Path,
     out: Path,
     *,
-    grid: int = 101,
-    cells: int = 6,
-    methods: str = DEFAULT_METHODS,
-    share: float = 0.67,
-    weights: str | None = None,
-    rtol: float = 5e-3,
-    seed: int = 0,
-    json: bool = False,
-    force: bool = False,
+    grid: int,
+    cells: int,
+    methods: str,
+    share: float,
+    weights: str | None,
+    rtol: float | None,
+    seed: int,
+    json: bool,
+    force: bool,
 ) -> None:
     """Write the map of a plan file into a folder, and print what it says."""
     from locbounds.cli.output import count_progress, output_folder, status
@@ -103,16 +117,18 @@ def map_plan(
     from locbounds.io.plans import read_plan
     from locbounds.report import map_plot, map_tables
     from locbounds.report.tables import csv_text
-    from locbounds.static import cells as bayes
+    from locbounds.static.cells import CELL_RTOL, MOST_CELLS, PER_CELL, per_cell
     from locbounds.static.common import check_rtol
     from locbounds.static.maps import AccuracyMap
+    from locbounds.static.over_prior import RTOL, over_prior
+    from locbounds.static.tightest import choose
 
     ids = _ids(methods)
-    rtol = check_rtol(rtol)
-    if cells > bayes.MOST_CELLS:
-        raise InputError(f"--cells is {cells}", f"Give a number from 0 to {bayes.MOST_CELLS}")
+    rtol, cell_rtol = (check_rtol(usual if rtol is None else rtol) for usual in (RTOL, CELL_RTOL))
+    if cells > MOST_CELLS:
+        raise InputError(f"--cells is {cells}", f"Give a number from 0 to {MOST_CELLS}")
     read = read_plan(path)
-    local = [id for id in ids if id in bayes.PER_CELL]
+    local = [id for id in ids if id in PER_CELL]
     notes = list(read.notes)
     found, refused = None, ""
     try:
@@ -136,20 +152,20 @@ def map_plan(
             figure = map_plot.draw_map(found, read.area, **marks)
             folder.write("map.png", lambda target: figure.savefig(target, dpi=150))
         with status("over the prior") as say:
-            numbers = bayes.over_prior(read.plan, ids, rtol=rtol, seed=seed, announce=say)
+            numbers = over_prior(read.plan, ids, rtol=rtol, seed=seed, announce=say)
         rows = [*_crlb_rows(found, refused), *map_tables.method_rows(numbers)]
         folder.write_text("methods.csv", csv_text(map_tables.METHOD_COLUMNS, rows))
         parts = []
         if cells and local:
             with count_progress("numbers per cell") as progress:
-                parts = bayes.per_cell(
-                    read.plan, read.area, local, cells=cells, height=read.heights_m, rtol=max(rtol, 2 * bayes.RTOL),
-                    seed=seed, progress=progress,
+                parts = per_cell(
+                    read.plan, read.area, local, cells=cells, height=read.heights_m, rtol=cell_rtol, seed=seed,
+                    progress=progress,
                 )  # fmt: skip
             folder.write_text("cells.csv", csv_text(map_tables.cell_columns(local), map_tables.cell_rows(parts, local)))
             picture = map_plot.draw_cells(read.plan, read.area, parts, local, anchors=read.positions)
             folder.write("cells.png", lambda target: picture.savefig(target, dpi=150))
-    best = bayes.choose(numbers)
+    best = choose(numbers)
     notes += [
         f"warning: {id}: {w}" for id, r in numbers.items() for w in getattr(getattr(r, "verdict", None), "warnings", ())
     ]
@@ -163,7 +179,7 @@ def map_plan(
 def _ids(text: str) -> list[str]:
     from locbounds.errors import InputError
     from locbounds.io.complain import close_key
-    from locbounds.static.cells import OVER_PRIOR
+    from locbounds.static.over_prior import OVER_PRIOR
 
     if text.strip().lower() == "none":
         return []
@@ -221,7 +237,7 @@ def _print(read: Any, path: Path, found: Any, rows: list[tuple[Any, ...]], best:
             for id, what, value, error, verdict, why in rows
         ],
     )
-    for text in (*([best.why] if best else []), *notes):
+    for text in (*([best.reason] if best else []), *notes):
         typer.echo(text)
 
 
@@ -286,7 +302,13 @@ def _print_json(
                 for row in found.statistics()
             ],
             "methods": [plain(map_tables.METHOD_COLUMNS, row) for row in rows],
-            "tightest": None if best is None else best._asdict(),
+            "tightest": best
+            and {
+                "id": best.best.id,
+                "rmse_m": best.rmse_m,
+                "runner_up": best.runner_up.id if best.runner_up else "",
+                "why": best.reason,
+            },
             "cells": [plain(map_tables.cell_columns(local), row) for row in map_tables.cell_rows(parts, local)],
             "notes": notes,
         }

@@ -1,6 +1,5 @@
 """``locbounds paper mcguire2009``: files and screen."""
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,11 @@ from locbounds.errors import InputError
 def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: int, json: bool) -> None:
     """Compute the wanted figures, write their files into the folder, print what was found."""
     from locbounds.papers import mcguire2009 as study
+    from locbounds.papers.data import DATA, data_folder
 
     wanted = _wanted(figures, data)
     if "fig9" in wanted:
-        study.data_folder(data)
+        data_folder(data, [s.folder for s in study.SETS], "Fig. 9")
     simple = [name for name in wanted if name in set(study.FIGURE_OF.values())]
     found, surveys = {}, {}
     with status("mcguire2009: starting") as say:
@@ -73,16 +73,16 @@ def mcguire2009(folder: Any, *, data: Path | None, figures: str | None, seed: in
     if surveys:
         _print_fig9(surveys)
     if "fig9" not in wanted and figures is None:
-        typer.echo(f"Fig. 9 needs measured surveys: name their folder with --data or in {study.DATA}.")
+        typer.echo(f"Fig. 9 needs measured surveys: name their folder with --data or in {DATA}.")
     typer.echo(f"\nwrote {', '.join(str(path) for path in folder.written)}")
 
 
 def _wanted(figures: str | None, data: Path | None) -> list[str]:
     from locbounds.papers import mcguire2009 as study
+    from locbounds.papers.data import named_folder
 
     if figures is None:
-        measured = data is not None or bool(os.environ.get(study.DATA))
-        return [name for name in study.FIGURES if name != "fig9" or measured]
+        return [name for name in study.FIGURES if name != "fig9" or named_folder(data) is not None]
     names = [name.strip() for name in figures.split(",") if name.strip()]
     unknown = [name for name in names if name not in study.FIGURES]
     if unknown or not names:

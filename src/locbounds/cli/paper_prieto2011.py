@@ -64,15 +64,14 @@ def prieto2011(folder: Any, *, samples: int | None, runs: int | None, data: Path
 
 def _survey(data: Path | None) -> tuple[Path | None, str]:
     """The folder of measured distances, or why there is none."""
-    import os
-
     from locbounds.errors import InputError
+    from locbounds.papers.data import DATA, named_folder
     from locbounds.papers.prieto2011.measured import FOLDER
 
-    named = data or os.environ.get("LOCBOUNDS_DATA")
-    if not named:
-        return None, f"measured distances skipped: name the folder that holds {FOLDER} with --data or in LOCBOUNDS_DATA"
-    folder = Path(named).expanduser() / FOLDER
+    named = named_folder(data)
+    if named is None:
+        return None, f"measured distances skipped: name the folder that holds {FOLDER} with --data or in {DATA}"
+    folder = named / FOLDER
     if folder.is_dir():
         return folder, ""
     if data is not None:

@@ -143,7 +143,7 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted, ho
     try:
         for entry in bounds:
             with precision_progress(entry.name) as progress:
-                results.append(registry.load(entry)(model, rtol=rtol, seed=seed, progress=progress, **_option(horizon)))
+                results.append(registry.load(entry)(model, rtol=rtol, seed=seed, progress=progress, horizon=horizon))
         if filters:
             with status(f"drawing {runs:,} tracks"):
                 draws = simulate(model, runs=runs, seed=seed)
@@ -193,11 +193,6 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted, ho
     for warning in dict.fromkeys(w for r in results for w in r.verdict.warnings):
         typer.echo(f"warning: {warning}")
     typer.echo(f"wrote {', '.join(str(path) for path in folder.written)}")
-
-
-def _option(horizon: "Horizon") -> dict[str, Any]:
-    """What is handed to a bound: nothing where it is the usual one, which every bound has."""
-    return {} if horizon.kind == "filter" else {"horizon": horizon}
 
 
 def _save(results, model, folder) -> None:

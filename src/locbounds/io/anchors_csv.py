@@ -90,6 +90,19 @@ def _remedy(name: str, header: list[str]) -> str:
     )
 
 
+def hoisted(keys: dict[str, Any]) -> dict[str, Any]:
+    """A file's keys, ``anchors_csv`` at the top: below a section TOML counts it to that section, a person to the file.
+
+    >>> hoisted({"format": 1, "links": {"anchors_csv": "anchors.csv"}})
+    {'format': 1, 'links': {}, 'anchors_csv': 'anchors.csv'}
+    """
+    for section, table in keys.items():
+        if isinstance(table, dict) and isinstance(table.get("anchors_csv"), str) and "anchors_csv" not in keys:
+            rest = {k: v for k, v in table.items() if k != "anchors_csv"}
+            return {**keys, section: rest, "anchors_csv": table["anchors_csv"]}
+    return keys
+
+
 def anchor_positions(anchors: Mapping[str, Any], anchors_csv: str | None, folder: Path) -> dict[str, Any]:
     """Positions of a file's anchors: from its own keys, otherwise from the table that it names.
 

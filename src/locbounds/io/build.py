@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import reduce
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from locbounds.io.schema import (
     OutlierTable,
     PriorSection,
     ScenarioFile,
+    Section,
     SightTable,
     TimeSection,
 )
@@ -36,6 +38,7 @@ from locbounds.sight import DwellSight, KnownSight, MarkovSight, Sight
 from locbounds.sight.markov import EQUAL_STEPS
 from locbounds.times import Times
 
+S = TypeVar("S", bound=Section)
 LETTERS = {"L": LOS, "N": NLOS}
 WORDS = {"los": LOS, "nlos": NLOS}
 
@@ -79,7 +82,12 @@ def build_motion(motion: MotionSection, dim: int) -> Motion:
         return ConstantVelocity(intensity, dim, discrete=motion.model == "constant-velocity-discrete")
 
 
-def _covariance(spread, dim: int) -> ndarray:
+def covariance_of(spread: Any, dim: int) -> ndarray:
+    """The covariance matrix that a deviation, one per axis, or the matrix itself says.
+
+    >>> covariance_of(3.0, 2).tolist()
+    [[9.0, 0.0], [0.0, 9.0]]
+    """
     if np.ndim(spread) == 2:
         return np.asarray(spread)
     return np.diag(np.broadcast_to(np.asarray(spread), dim) ** 2)
@@ -94,7 +102,7 @@ def build_prior(prior: PriorSection) -> GaussianPrior:
     else:
         for i, name in enumerate(SPREADS[: len(means)]):
             block = slice(i * n, (i + 1) * n)
-            covariance[block, block] = _covariance(getattr(prior, name), n)
+            covariance[block, block] = covariance_of(getattr(prior, name), n)
             with at(f"prior.{name}"):
                 GaussianPrior(np.zeros(n), covariance[block, block])
     with at("prior"):
@@ -213,12 +221,10 @@ def build_link(name: str, position: tuple[float, ...], table: LinksSection, time
     return Link(name, measurement, sight, noises, reports)
 
 
-def merged(shared: LinksSection, own: AnchorTable | None) -> LinksSection:
-    """The shared keys, each replaced as a whole where the anchor gives its own."""
-    if own is None:
-        return shared
-    given = {key: getattr(own, key) for key in own.model_fields_set}
-    return AnchorTable.model_construct(**{**{k: getattr(shared, k) for k in shared.model_fields_set}, **given})
+def merged(shared: Section, own: Section | None, kind: type[S]) -> S:
+    """The shared keys, each replaced as a whole where the anchor gives its own, as a section of this kind."""
+    given = {k: getattr(section, k) for section in (shared, own) if section for k in section.model_fields_set}
+    return kind.model_construct(**given)
 
 
 def build(file: ScenarioFile, folder: Path) -> Scenario:
@@ -232,5 +238,7 @@ def build(file: ScenarioFile, folder: Path) -> Scenario:
                 "Use the same number of coordinates everywhere",
             )
     times = build_times(file.time)
-    links = [build_link(n, p, merged(file.links, file.anchors.get(n)), times) for n, p in positions.items()]
+    links = [
+        build_link(n, p, merged(file.links, file.anchors.get(n), AnchorTable), times) for n, p in positions.items()
+    ]
     return Scenario(file.title, times, build_motion(file.motion, dim), build_prior(file.prior), links)

@@ -9,12 +9,13 @@ from typing import Literal, NamedTuple
 from pydantic import ValidationError, model_validator
 
 from locbounds.errors import InputError
-from locbounds.io.anchors_csv import read_anchors
+from locbounds.io.anchors_csv import anchor_positions, hoisted
+from locbounds.io.build import at
 from locbounds.io.complain import complain
 from locbounds.io.footprints import read_city
 from locbounds.io.link_table import read_links
 from locbounds.io.schema import Section, key, needed
-from locbounds.io.toml import parse_toml
+from locbounds.io.toml import read_toml
 from locbounds.io.values import Numbers, Point, Positive, Text, Whole, fail
 from locbounds.propagation import City, LinkTable
 from locbounds.propagation.city import GAP_M
@@ -64,7 +65,7 @@ class MeasureSection(Section):
 class CityAnchor(Section):
     """One anchor."""
 
-    position_m: Point = needed("position in metres, position_m = [120, 340]")
+    position_m: Point | None = key("position in metres, position_m = [120, 340]")
     roof: bool = key("true: on the roof of the building around it, which then does not block it", False)
 
 
@@ -116,26 +117,18 @@ def load_city(path: str | os.PathLike) -> CityFile:
     locbounds.errors.InputError: cannot read absent.toml: no such file or directory. Give a TOML file ...
     """
     path = Path(path)
+    found = read_toml(path, "Give a TOML file with a section [city]")
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"cannot read {path}: {reason.lower()}", "Give a TOML file with a section [city]") from error
-    try:
-        keys = CityFileKeys.model_validate(parse_toml(text, path.name))
+        keys = CityFileKeys.model_validate(hoisted(found))
     except ValidationError as error:
         raise complain(error, path.name, CityFileKeys) from None
-    places = (
-        {name: p[:2] for name, p in read_anchors(path.parent / keys.anchors_csv).items()} if keys.anchors_csv else {}
-    )
     for name, anchor in keys.anchors.items():
-        if len(anchor.position_m) != 2:
+        if len(anchor.position_m or "xy") != 2:
             raise InputError(
-                f"{path.name}: anchors.{name}.position_m has {len(anchor.position_m)} numbers", "Give x and y"
+                f"{path.name}: anchors.{name}.position_m has {len(anchor.position_m or ())} numbers", "Give x and y"
             )
-        places[name] = anchor.position_m
-    if not places:
-        raise InputError(f"{path.name} has no anchors", "Add [anchors] with a line NAME = { position_m = [x, y] } each")
+    with at(path.name):
+        places = {name: p[:2] for name, p in anchor_positions(keys.anchors, keys.anchors_csv, path.parent).items()}
     least = 2 if "tdoa" in keys.measure.kinds else 1
     if not least <= keys.measure.nearest <= len(places):
         few = len(places) < least

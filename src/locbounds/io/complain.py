@@ -83,9 +83,27 @@ def _section_of(name: str, root: type[BaseModel]) -> str | None:
     return None
 
 
-def _explain(error: Any, root: type[BaseModel]) -> tuple[str, str]:
+Location = tuple[str | int, ...]  # of a key: names of tables, numbers in lists
+
+
+class Wording:
+    """How the keys of a file were written: as they are validated. Files that are written otherwise say so."""
+
+    def path(self, location: Location) -> Location:
+        """A location as it was written."""
+        return location
+
+    def text(self, location: Location, text: str) -> str:
+        """A message about a location in the words of the file."""
+        return text
+
+
+AS_VALIDATED = Wording()
+
+
+def _explain(error: Any, root: type[BaseModel], written: Location) -> tuple[str, str]:
     location, kind, value = error["loc"], error["type"], error["input"]
-    path = ".".join(str(part) for part in location)
+    path = ".".join(str(part) for part in written)
     model, teaching = _schema_at(location, root)
     name = next((part for part in reversed(location) if isinstance(part, str)), "")
     remedy = f"{name}: {teaching}" if teaching else ""
@@ -104,7 +122,9 @@ def _explain(error: Any, root: type[BaseModel]) -> tuple[str, str]:
     return f"{path} is {quoted(value)}: {error['msg']}", remedy
 
 
-def complain(error: ValidationError, source: str, root: type[BaseModel] = ScenarioFile) -> InputError:
+def complain(
+    error: ValidationError, source: str, root: type[BaseModel] = ScenarioFile, wording: Wording = AS_VALIDATED
+) -> InputError:
     """The most telling of the errors of a validation; unknown keys come first, since they explain missing ones.
 
     Parameters
@@ -115,9 +135,12 @@ def complain(error: ValidationError, source: str, root: type[BaseModel] = Scenar
         Name of the file, put in front of the cause.
     root
         What the whole file was validated as.
+    wording
+        How its keys were written, if not as they are validated.
     """
     errors = error.errors(include_url=False)
     first = min(errors, key=lambda e: e["type"] != "extra_forbidden")
-    cause, remedy = _explain(first, root)
+    location = first["loc"]
+    cause, remedy = (wording.text(location, text) for text in _explain(first, root, wording.path(location)))
     more = f" ({len(errors) - 1} more after this one)" if len(errors) > 1 else ""
     return InputError(f"{source}: {cause}{more}", remedy)

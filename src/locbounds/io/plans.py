@@ -2,7 +2,6 @@
 
 import math
 import os
-import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,20 +9,26 @@ import numpy as np
 from pydantic import ValidationError
 
 from locbounds.errors import InputError
-from locbounds.io.anchors_csv import anchor_positions
-from locbounds.io.build import at, build_noises
+from locbounds.io.anchors_csv import anchor_positions, hoisted
+from locbounds.io.build import at, build_noises, covariance_of, merged
 from locbounds.io.complain import close_key, complain, quoted
 from locbounds.io.kinds import expect
 from locbounds.io.plan_schema import AreaSection, PlanAnchor, PlanFile, PlanLinks, PriorTable, Shape
-from locbounds.io.schema import NlosTable, NoiseTable
-from locbounds.io.toml import parse_toml
+from locbounds.io.plan_units import NOISES, UNITS, Written
+from locbounds.io.schema import NlosTable
+from locbounds.io.toml import parse_toml, read_toml
 from locbounds.noise import Gaussian, Noise
 from locbounds.plan import FLAT, Plan, aoa, rss, soft, tdoa, toa
-from locbounds.priors import GaussianPrior, PositionPrior, PriorMixture, Prism, UniformBox, UniformDisc, UniformPolygon
-
-UNITS = {"toa": ("m",), "tdoa": ("m",), "rss": ("db",), "aoa": ("rad", "deg")}
-NOISES = ("los", "nlos", "outlier")
-WORDS = {"db": "dB", "rad": "radians", "m": "metres"}
+from locbounds.priors import (
+    GaussianPrior,
+    PositionPrior,
+    PriorMixture,
+    Prism,
+    UniformBox,
+    UniformDisc,
+    UniformPolygon,
+    UniformPrior,
+)
 
 
 class PlanMap(NamedTuple):
@@ -32,7 +37,7 @@ class PlanMap(NamedTuple):
     Attributes
     ----------
     plan : Plan
-    area : PositionPrior
+    area : UniformPrior
         Uniform law of the plane over the area of the map.
     height_m : float or None
         In 3-D: height of the map.
@@ -47,7 +52,7 @@ class PlanMap(NamedTuple):
     """
 
     plan: Plan
-    area: PositionPrior
+    area: UniformPrior
     height_m: float | None
     heights_m: tuple[float, float] | None
     names: tuple[str, ...]
@@ -79,15 +84,7 @@ def read_plan(path: str | os.PathLike) -> PlanMap:
     ('a2-a1', 'a3-a1', 'a4-a1')
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        missing = isinstance(error, FileNotFoundError)
-        remedy = f"Make one with: locbounds new {path} --like plan" if missing else "Give a TOML file"
-        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}", remedy) from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not a text file in UTF-8", "Save it as UTF-8") from error
-    return read_text(text, folder=path.parent, source=path.name)
+    return _plan(read_toml(path, f"Make one with: locbounds new {path} --like plan"), path.parent, path.name)
 
 
 def read_text(text: str, *, folder: str | os.PathLike = ".", source: str = "plan") -> PlanMap:
@@ -100,82 +97,19 @@ def read_text(text: str, *, folder: str | os.PathLike = ".", source: str = "plan
     plan: unknown key links.los.std_m = 4
     Did you mean std_db? The errors of "rss" are in dB
     """
-    keys = parse_toml(text, source)
+    return _plan(parse_toml(text, source), Path(folder), source)
+
+
+def _plan(keys: dict[str, Any], folder: Path, source: str) -> PlanMap:
     expect(keys, "plan", source)
-    units: dict[str, str] = {}
+    with at(source):
+        written = Written(hoisted(keys))
     try:
-        file = PlanFile.model_validate(_in_metres(keys, units))
-        return _build(file, Path(folder))
+        file = PlanFile.model_validate(written.keys)
     except ValidationError as error:
-        told = complain(error, source, PlanFile)
-        unit = _unit_of(told.cause, units)
-        raise InputError(_in_units(told.cause, unit), _in_units(told.remedy, unit)) from None
-    except InputError as error:
-        raise InputError(f"{source}: {error.cause}", error.remedy) from error
-
-
-def _in_metres(keys: dict[str, Any], units: dict[str, str]) -> dict[str, Any]:
-    """Noise tables of strengths and angles with the keys of the tables of ranges; fills in the unit by path."""
-    links = keys.get("links")
-    shared = links.get("measure") if isinstance(links, dict) else None
-    found = dict(keys)
-    if isinstance(links, dict):
-        found["links"] = _renamed(links, shared, "links", units)
-    if isinstance(keys.get("anchors"), dict):
-        found["anchors"] = {
-            name: _renamed(a, a.get("measure", shared), f"anchors.{name}", units) if isinstance(a, dict) else a
-            for name, a in keys["anchors"].items()
-        }
-    return found
-
-
-def _renamed(table: dict[str, Any], measure: Any, path: str, units: dict[str, str]) -> dict[str, Any]:
-    if not isinstance(measure, str) or measure not in UNITS:
-        return table
-    units[path] = UNITS[measure][0]
-    return {k: _noise(v, measure, f"{path}.{k}") if k in NOISES else v for k, v in table.items()}
-
-
-def _noise(value: Any, measure: str, path: str) -> Any:
-    if isinstance(value, list):
-        return [_noise(v, measure, path) for v in value]
-    if not isinstance(value, dict):
-        return value
-    out = {}
-    for name, inner in value.items():
-        stem, _, unit = name.rpartition("_")
-        if stem and unit in ("m", "db", "rad", "deg"):
-            if unit not in UNITS[measure]:
-                words = WORDS[UNITS[measure][0]]
-                known = [f"{stem}_{u}" for u in UNITS[measure]]
-                raise InputError(
-                    f"unknown key {path}.{name} = {quoted(inner)}",
-                    f'Did you mean {" or ".join(known)}? The errors of "{measure}" are in {words}',
-                )
-            out[f"{stem}_m"] = _scaled(inner, math.pi / 180) if unit == "deg" else inner
-        else:
-            out[name] = _noise(inner, measure, f"{path}.{name}")
-    return out
-
-
-def _scaled(value: Any, factor: float) -> Any:
-    if isinstance(value, list):
-        return [_scaled(v, factor) for v in value]
-    return value * factor if isinstance(value, int | float) and not isinstance(value, bool) else value
-
-
-def _unit_of(cause: str, units: dict[str, str]) -> str:
-    paths = sorted((p for p in units if f"{p}." in cause), key=len)
-    return units[paths[-1]] if paths else "m"
-
-
-def _in_units(text: str, unit: str) -> str:
-    if unit == "m":
-        return text
-    names = {n for table in (NoiseTable, NlosTable) for n in table.model_fields if n.endswith(("_m", "s_m"))}
-    for name in sorted(names, key=len, reverse=True):
-        text = re.sub(rf"\b{name}\b", f"{name[:-1]}{unit}", text)
-    return text.replace("in metres", f"in {WORDS[unit]}")
+        raise complain(error, source, PlanFile, written) from None
+    with at(source):
+        return _build(written.in_si(file), folder)
 
 
 def _build(file: PlanFile, folder: Path) -> PlanMap:
@@ -190,7 +124,7 @@ def _build(file: PlanFile, folder: Path) -> PlanMap:
         with at("prior"):
             prior = _prior(file.prior, dim)
     plan, left_out, notes = _measured(file, positions)
-    plan = plan.replace(title=file.title, prior=prior, area=None)
+    plan = plan.replace(title=file.title, prior=prior)
     few = plan.too_few()
     if few and prior is not None:
         notes = (*notes, f"no Cramér-Rao bound: {few}; the numbers over the prior rest on it")
@@ -203,7 +137,7 @@ def _build(file: PlanFile, folder: Path) -> PlanMap:
     return PlanMap(plan, area, height, heights, tuple(positions), places, left_out, notes)
 
 
-def _region(shape: Shape, path: str) -> PositionPrior:
+def _region(shape: Shape, path: str) -> UniformPrior:
     """A region of the plane, or a box."""
     with at(path):
         if shape.outline_m is not None:
@@ -219,7 +153,7 @@ def _region(shape: Shape, path: str) -> PositionPrior:
         return UniformBox(shape.low_m, shape.high_m)
 
 
-def _area(area: AreaSection, dim: int) -> tuple[PositionPrior, float | None, PositionPrior | None]:
+def _area(area: AreaSection, dim: int) -> tuple[UniformPrior, float | None, PositionPrior | None]:
     """Region of the plane, height of the map, and the prior that is uniform over it."""
     region, height = _region(area, "area"), area.height_m
     number: Any = height
@@ -255,15 +189,14 @@ def _area(area: AreaSection, dim: int) -> tuple[PositionPrior, float | None, Pos
 
 def _prior(table: PriorTable, dim: int) -> PositionPrior:
     if table.mixture is not None:
-        shares = [part.share or 0.0 for part in table.mixture]
-        if abs(sum(shares) - 1) > 1e-9:
-            raise InputError(f"the shares of the mixture sum to {sum(shares):.6g}", "Shares must sum to one")
-        return PriorMixture(shares, [_prior(part, dim) for part in table.mixture])
+        return PriorMixture(
+            [part.share or 0.0 for part in table.mixture], [_prior(part, dim) for part in table.mixture]
+        )
     if table.position_m is not None:
         spread, n = np.asarray(table.position_std_m, dtype=float), len(table.position_m)
         if spread.ndim == 1 and len(spread) != n:
             raise InputError(f"position_m has {n} coordinates, position_std_m {len(spread)}", "Give as many of each")
-        prior: PositionPrior = GaussianPrior(table.position_m, spread if spread.ndim == 2 else np.eye(n) * spread**2)
+        prior: PositionPrior = GaussianPrior(table.position_m, covariance_of(spread, n))
     else:
         prior = _region(table, "region")
     if prior.dim != dim:
@@ -279,12 +212,11 @@ class _Link(NamedTuple):
 
 
 def _links(file: PlanFile, positions: dict[str, tuple[float, ...]]) -> list[_Link]:
-    shared = {k: getattr(file.links, k) for k in file.links.model_fields_set}
     out = []
     for name, position in positions.items():
         own = file.anchors.get(name)
-        mine = {} if own is None else {k: getattr(own, k) for k in own.model_fields_set}
-        table = PlanAnchor.model_construct(**{**shared, **mine})
+        mine = set() if own is None else own.model_fields_set
+        table = merged(file.links, own, PlanAnchor)
         if table.measure is None:
             raise InputError(
                 f"anchors.{name} has no measure, and neither has [links]",

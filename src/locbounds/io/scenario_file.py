@@ -8,13 +8,13 @@ from typing import Any
 import tomlkit
 from pydantic import ValidationError
 
-from locbounds.errors import InputError
-from locbounds.io.build import build
+from locbounds.io.anchors_csv import hoisted
+from locbounds.io.build import at, build
 from locbounds.io.complain import complain
 from locbounds.io.files import atomic_write_text
 from locbounds.io.kinds import expect
 from locbounds.io.schema import ScenarioFile
-from locbounds.io.toml import parse_toml
+from locbounds.io.toml import parse_toml, read_toml
 from locbounds.io.write import file_keys
 from locbounds.scenario import Scenario
 
@@ -43,6 +43,7 @@ def loads(text: str, *, folder: str | os.PathLike = ".", source: str = "scenario
 
     Examples
     --------
+    >>> from locbounds.errors import InputError
     >>> try:
     ...     loads("format = 1\n[time]\nstep_ms = 200\nsteps = 100")
     ... except InputError as error:
@@ -50,16 +51,7 @@ def loads(text: str, *, folder: str | os.PathLike = ".", source: str = "scenario
     scenario: unknown key time.step_ms = 200 (2 more after this one)
     Did you mean step_s? Known here: step_s, steps, times_s
     """
-    keys = parse_toml(text, source)
-    expect(keys, "scenario", source)
-    try:
-        file = ScenarioFile.model_validate(_hoisted(keys))
-    except ValidationError as error:
-        raise complain(error, source) from None
-    try:
-        return build(file, Path(folder))
-    except InputError as error:
-        raise InputError(f"{source}: {error.cause}", error.remedy) from error
+    return _scenario(parse_toml(text, source), Path(folder), source)
 
 
 def load(path: str | os.PathLike) -> Scenario:
@@ -85,24 +77,17 @@ def load(path: str | os.PathLike) -> Scenario:
     100
     """
     path = Path(path)
+    return _scenario(read_toml(path, f"Make one with: locbounds new {path}"), path.parent, path.name)
+
+
+def _scenario(keys: dict[str, Any], folder: Path, source: str) -> Scenario:
+    expect(keys, "scenario", source)
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        remedy = f"Make one with: locbounds new {path}" if isinstance(error, FileNotFoundError) else "Give a TOML file"
-        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}", remedy) from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not a text file in UTF-8", "Save it as UTF-8") from error
-    return loads(text, folder=path.parent, source=path.name)
-
-
-def _hoisted(keys: dict[str, Any]) -> dict[str, Any]:
-    """``anchors_csv`` written after a section: TOML counts it to that section, a person to the file."""
-    for section in ("links", "anchors"):
-        table = keys.get(section)
-        if isinstance(table, dict) and isinstance(table.get("anchors_csv"), str) and "anchors_csv" not in keys:
-            keys = {**keys, "anchors_csv": table["anchors_csv"]}
-            keys[section] = {k: v for k, v in table.items() if k != "anchors_csv"}
-    return keys
+        file = ScenarioFile.model_validate(hoisted(keys))
+    except ValidationError as error:
+        raise complain(error, source) from None
+    with at(source):
+        return build(file, folder)
 
 
 TEACHING = {

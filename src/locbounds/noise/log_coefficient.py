@@ -16,7 +16,7 @@ import numpy as np
 from locbounds.axes import Array, Float, ndarray
 from locbounds.errors import RefusedError
 from locbounds.noise.base import Noise
-from locbounds.noise.shifted_copies import _W, _X, _panels
+from locbounds.noise.shifted_copies import integral, panels
 from locbounds.precision import double_precision
 
 SMALLEST, POINTS = 1e-4, 100  # of the table: in deviations, and how many
@@ -59,12 +59,12 @@ def _over(noise: Noise, shifts: Array) -> tuple[Array, Array]:
     """``1 - rho`` and ``rho``."""
 
     def one(h: Array) -> tuple[Array, Array]:
-        low, high = _panels(noise, h)
-        half = 0.5 * (high - low)
-        w = (0.5 * (low + high))[:, None] + half[:, None] * _X
-        a, b = (jnp.exp(0.5 * noise.log_prob(v)) for v in (w, w - h))
-        weight = half[:, None] * _W
-        return 0.5 * jnp.sum(weight * (a - b) ** 2), jnp.sum(weight * a * b)
+        def both(w: Array) -> Array:
+            a, b = (jnp.exp(0.5 * noise.log_prob(v)) for v in (w, w - h))
+            return jnp.stack([0.5 * (a - b) ** 2, a * b])
+
+        low, high = integral(both, *panels(noise, h))
+        return low, high
 
     return jax.lax.map(one, shifts, batch_size=8)
 

@@ -32,8 +32,6 @@ class Plan(eqx.Module):
     clock_std_m
         Standard deviation of the mobile's clock offset, times the speed of light, which adds to every time of arrival:
         None if the clock is known, infinite (``locbounds.plan.FLAT``) if nothing is known of it.
-    area
-        Where maps are drawn: any uniform prior; by default that of ``prior``.
     title
         One line that names it.
 
@@ -60,23 +58,20 @@ class Plan(eqx.Module):
     groups: tuple[Observations, ...] = eqx.field(converter=tuple)
     prior: PositionPrior | None = None
     clock_std_m: Scalar | None = None
-    area: PositionPrior | None = None
     title: str = eqx.field(static=True, default="")
 
     def __check_init__(self):
         if not self.groups:
             raise InputError("the plan measures nothing", "Give at least one group of observations")
         dims = {m.dim for m in self.measurements if m.dim is not None}
-        dims |= {law.dim for law in (self.prior, self.area) if law is not None}
+        dims |= set() if self.prior is None else {self.prior.dim}
         if len(dims) > 1:
             raise InputError(
-                f"measurements, prior and area of the plan have {sorted(dims)} coordinates",
+                f"measurements and prior of the plan have {sorted(dims)} coordinates",
                 "Use the same number of dimensions everywhere",
             )
         if not dims:
-            raise InputError(
-                "the plan does not say how many coordinates a position has", "Give a prior, an area, or an anchor"
-            )
+            raise InputError("the plan does not say how many coordinates a position has", "Give a prior, or an anchor")
         clock = self.clock_std_m
         if clock is not None and not traced(clock) and not (np.shape(clock) == () and clock > 0):
             raise InputError(
@@ -90,7 +85,7 @@ class Plan(eqx.Module):
 
     def replace(self, **changes: Any) -> "Plan":
         """A copy with some fields changed; all checks run again."""
-        fields = {name: getattr(self, name) for name in ("groups", "prior", "clock_std_m", "area", "title")}
+        fields = {name: getattr(self, name) for name in ("groups", "prior", "clock_std_m", "title")}
         return Plan(**(fields | changes))
 
     def __add__(self, other: "Plan") -> "Plan":
@@ -98,7 +93,7 @@ class Plan(eqx.Module):
         if not isinstance(other, Plan):
             return NotImplemented
         merged = {}
-        for name in ("prior", "clock_std_m", "area"):
+        for name in ("prior", "clock_std_m"):
             one, two = getattr(self, name), getattr(other, name)
             if one is not None and two is not None and one is not two and one != two:
                 raise InputError(f"both plans have a {name} of their own", "Give it to the sum: plan.replace(...)")
@@ -113,8 +108,9 @@ class Plan(eqx.Module):
     @property
     def dim(self) -> int:
         """Number of coordinates of a position."""
-        dims = [m.dim for m in self.measurements] + [law.dim for law in (self.prior, self.area) if law is not None]
-        return next(dim for dim in dims if dim is not None)
+        if self.prior is not None:
+            return self.prior.dim
+        return next(m.dim for m in self.measurements if m.dim is not None)
 
     @property
     def size(self) -> int:

@@ -33,7 +33,7 @@ def toa(
     names
         Names of the anchors.
     **plan
-        ``prior``, ``area``, ``title`` of :class:`~locbounds.Plan`.
+        ``prior``, ``title`` of :class:`~locbounds.Plan`.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def tdoa(anchors: Any, std_m: Deviation, *, reference: int = 0, names: Sequence[
     names
         Names of the anchors.
     **plan
-        ``prior``, ``area``, ``title`` of :class:`~locbounds.Plan`.
+        ``prior``, ``title`` of :class:`~locbounds.Plan`.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def rss(
     names
         Names of the anchors.
     **plan
-        ``prior``, ``area``, ``title`` of :class:`~locbounds.Plan`.
+        ``prior``, ``title`` of :class:`~locbounds.Plan`.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def aoa(anchors: Any, std_rad: Deviation, *, names: Sequence[str] = (), **plan: 
     names
         Names of the anchors.
     **plan
-        ``prior``, ``area``, ``title`` of :class:`~locbounds.Plan`.
+        ``prior``, ``title`` of :class:`~locbounds.Plan`.
 
     Examples
     --------
@@ -189,7 +189,7 @@ def observe(
     unit
         ``"m"``, ``"dB"``, ``"rad"`` or ``""``.
     **plan
-        ``prior``, ``area``, ``title`` of :class:`~locbounds.Plan`.
+        ``prior``, ``title`` of :class:`~locbounds.Plan`.
 
     Examples
     --------

@@ -6,7 +6,7 @@ from locbounds.priors.mixture import PriorMixture
 from locbounds.priors.polygon import UniformPolygon
 from locbounds.priors.position import PositionPrior
 from locbounds.priors.prism import Prism
-from locbounds.priors.uniform import UniformBox, UniformDisc
+from locbounds.priors.uniform import UniformBox, UniformDisc, UniformPrior
 
 __all__ = [
     "DensityPrior",
@@ -17,4 +17,5 @@ __all__ = [
     "UniformBox",
     "UniformDisc",
     "UniformPolygon",
+    "UniformPrior",
 ]

@@ -8,8 +8,8 @@ import numpy as np
 
 from locbounds.axes import Array, Bool, Float, ndarray
 from locbounds.errors import InputError
-from locbounds.priors.position import PositionPrior, as_points, legendre, product
-from locbounds.priors.uniform import EDGE
+from locbounds.priors.position import as_points, legendre, product
+from locbounds.priors.uniform import UniformPrior
 
 
 def outline(corners: Any, name: str = "the outline") -> Float[Array, "corners 2"]:
@@ -30,7 +30,7 @@ def outline(corners: Any, name: str = "the outline") -> Float[Array, "corners 2"
     return ring
 
 
-class UniformPolygon(PositionPrior):
+class UniformPolygon(UniformPrior):
     """Uniform law on a polygon.
 
     Parameters
@@ -146,6 +146,3 @@ class UniformPolygon(PositionPrior):
         u, v = rng.random((2, n, 1))
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
         return a + (b - a) * u + (c - a) * v
-
-    def irregular(self) -> str:
-        return EDGE

@@ -1,4 +1,8 @@
-"""Uniform laws on a disc and on a box."""
+"""Uniform laws on a disc and on a box, and what all uniform laws share."""
+
+from abc import abstractmethod
+from functools import cached_property
+from typing import Any
 
 import equinox as eqx
 import numpy as np
@@ -11,7 +15,19 @@ from locbounds.priors.position import PositionPrior, as_points, legendre, produc
 EDGE = "the density of a uniform law jumps at the edge of its support"
 
 
-class UniformDisc(PositionPrior):
+class UniformPrior(PositionPrior):
+    """Uniform law on a region."""
+
+    @property
+    @abstractmethod
+    def shape(self) -> Any:
+        """The region in the plane as a Shapely polygon, seen from above where it has heights."""
+
+    def irregular(self) -> str:
+        return EDGE
+
+
+class UniformDisc(UniformPrior):
     """Uniform law on a disc, in two dimensions.
 
     Parameters
@@ -65,6 +81,13 @@ class UniformDisc(PositionPrior):
         radii = self.radius * polar[:, :1]
         return self.center + radii * np.stack([np.cos(polar[:, 1]), np.sin(polar[:, 1])], axis=1), weights
 
+    @cached_property
+    def shape(self) -> Any:
+        """A polygon of 128 corners on the circle."""
+        import shapely
+
+        return shapely.Point(*self.center).buffer(float(self.radius), quad_segs=32)
+
     def bounds(self) -> tuple[Float[Array, " space"], Float[Array, " space"]]:
         return self.center - self.radius, self.center + self.radius
 
@@ -73,11 +96,8 @@ class UniformDisc(PositionPrior):
         r, angle = self.radius * np.sqrt(rng.random(n)), 2 * np.pi * rng.random(n)
         return self.center + np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1)
 
-    def irregular(self) -> str:
-        return EDGE
 
-
-class UniformBox(PositionPrior):
+class UniformBox(UniformPrior):
     """Uniform law on a box with sides along the axes.
 
     Parameters
@@ -128,11 +148,17 @@ class UniformBox(PositionPrior):
         """Gauss-Legendre along every axis."""
         return product(*(legendre(n, a, b) for a, b in zip(self.low, self.high, strict=True)))
 
+    @cached_property
+    def shape(self) -> Any:
+        """The rectangle of the first two coordinates."""
+        import shapely
+
+        if self.dim < 2:
+            raise InputError("a box of one coordinate has no outline in the plane", "Give corners of two or three")
+        return shapely.box(*self.low[:2], *self.high[:2])
+
     def bounds(self) -> tuple[Float[Array, " space"], Float[Array, " space"]]:
         return self.low, self.high
 
     def sample(self, n: int, *, seed: int = 0) -> Float[Array, "n space"]:
         return self.low + (self.high - self.low) * np.random.default_rng(seed).random((n, self.dim))
-
-    def irregular(self) -> str:
-        return EDGE

@@ -10,15 +10,13 @@ import numpy as np
 
 from locbounds.axes import LOS, Bool, Float, ndarray
 from locbounds.propagation import City, Links
-from locbounds.report.plan_view import draw_anchors, scale_bar
+from locbounds.report.plan_view import colours, draw_anchors, outline, scale_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 BUILDING, WALL = "#C9C4BB", "#8A847A"
-MOST_TICKS = 12  # of whole numbers at a colour bar
-LOGARITHMIC = 10.0  # a wider range of values has logarithmic colours
 NO_VALUE = "#DFE3E8"
 FREE, BLOCKED, STREET = "#0072B2", "#D55E00", "#E9F1E6"
 
@@ -51,15 +49,6 @@ def draw_buildings(panel: "Axes", city: City, *, bounds: Any = None, bar: bool =
     panel.tick_params(labelsize=8)
     if bar:
         scale_bar(panel)
-
-
-def outline(polygon: Any) -> Any:
-    """A Shapely polygon with its holes as one matplotlib path."""
-    import shapely
-    from matplotlib.path import Path
-
-    rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
-    return Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
 
 
 def draw_paths(panel: "Axes", links: Links, pairs: Iterable[tuple[int, int]]) -> None:
@@ -149,8 +138,7 @@ def draw_map(
 ) -> "Figure":
     """A quantity over the streets, as colours with a bar; cells that are not finite stay empty.
 
-    Colours are logarithmic where the values spread over more than a factor of 10, and steps where they are few whole
-    numbers.
+    Colours are those of :func:`~locbounds.report.plan_view.colours`.
 
     Parameters
     ----------
@@ -184,18 +172,15 @@ def draw_map(
     >>> figure.axes[1].get_ylabel()
     'excess delay in m'
     """
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap, LogNorm, Normalize
+    from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
-    from matplotlib.ticker import LogLocator
 
     values = np.where(np.isfinite(value), value, np.nan).reshape(len(y), len(x))
-    some = values[np.isfinite(values)]
+    scale = colours(values, high)
     inside = city.inside(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)).reshape(values.shape)
     empty = np.isnan(values) & ~inside & (False if streets is None else np.asarray(streets).reshape(values.shape))
     values = _under_walls(values, inside)
-    high = high if high is not None else float(np.quantile(some, 0.98)) if some.size else 1.0
     figure = Figure(figsize=(7.6, 6.2), layout="constrained")
     panel = figure.subplots()
     steps = [np.ptp(v) / max(len(v) - 1, 1) or 1.0 for v in (x, y)]
@@ -209,24 +194,13 @@ def draw_map(
             handles=[Patch(facecolor=NO_VALUE, edgecolor=WALL, lw=0.4, label=without)],
             loc="outside lower center", frameon=False, fontsize=9,
         )  # fmt: skip
-    whole = bool(some.size) and not np.any(some % 1) and high <= MOST_TICKS
-    wide = not whole and bool(some.size) and some.min() > 0 and high > LOGARITHMIC * some.min()
-    image = panel.imshow(
-        values, origin="lower", extent=extent, interpolation="nearest", zorder=1,
-        cmap=colormaps["viridis"].resampled(int(high) + 1) if whole else "viridis",
-        norm=LogNorm(some.min(), high) if wide
-        else Normalize(-0.5, int(high) + 0.5) if whole
-        else Normalize(0.0, high or 1.0),
-    )  # fmt: skip
+    panel.imshow(
+        values, origin="lower", extent=extent, interpolation="nearest", zorder=1, cmap=scale.cmap, norm=scale.norm
+    )
     draw_buildings(panel, city, bounds=(extent[0], extent[2], extent[1], extent[3]))
     if anchors is not None:
         draw_anchors(panel, np.asarray(anchors), names or [str(k + 1) for k in range(len(anchors))])
-    over = bool(some.size and some.max() > (high or 1.0))
-    ticks = np.arange(int(high) + 1) if whole else LogLocator(subs=(1.0, 2.0, 5.0)) if wide else None
-    bar = figure.colorbar(image, ax=panel, label=label, extend="max" if over else "neither", shrink=0.9, ticks=ticks)
-    if wide:
-        bar.ax.yaxis.set_major_formatter("{x:g}")
-        bar.ax.yaxis.set_minor_formatter("")
+    scale.bar(figure, panel, label, shrink=0.9)
     if title:
         panel.set_title(title, loc="left", fontsize=10)
     return figure

@@ -8,17 +8,16 @@ import numpy as np
 from locbounds.axes import Float, ndarray
 from locbounds.plan import Plan
 from locbounds.registry import method
-from locbounds.report.plan_view import draw_anchors, draw_outline, frame, scale_bar
-from locbounds.static.cells import Cell, outline_of, rmse_of
+from locbounds.report.plan_view import Colours, colours, draw_anchors, draw_outline, frame, outline, scale_bar
+from locbounds.static.cells import Cell
 from locbounds.static.crlb import REASONS
 from locbounds.static.maps import AccuracyMap, quantile_name
+from locbounds.static.over_prior import rmse_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-TOP = 0.98  # quantile of the values at the top of a colour bar, so that a few bad places do not hide the rest
-LOGARITHMIC = 8.0  # a wider range of values has logarithmic colours
 ELLIPSES = 9  # along the longer side
 SIDE_IN = 4.6  # inches of a panel's longer side
 NO_BOUND = "#D62728"
@@ -110,23 +109,18 @@ def draw_cells(plan: Plan, area: Any, cells: Sequence[Cell], ids: Sequence[str],
     >>> draw_cells(plan, hall, cells, ["ezzb"]).axes[1].get_ylabel()
     'RMSE in m'
     """
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
     anchors = np.asarray(plan.anchors if anchors is None else anchors)[:, :2]
     values = {id: np.array([rmse_of(cell.found.get(id))[0] for cell in cells]) for id in ids}
     every = np.concatenate(list(values.values()))
-    every = every[np.isfinite(every)]
-    low, high = (float(every.min()), float(every.max())) if every.size else (0.0, 1.0)
-    scale = ScalarMappable(Normalize(low if high - low > 0.02 * high else 0.0, high or 1.0), "viridis")
+    scale = colours(every, float(every[np.isfinite(every)].max(initial=0.0)) or 1.0)
     figure, axes, _ = _panels(area, anchors, (), len(ids))
     for panel, id in zip(axes, ids, strict=True):
         entry = method(id)
-        _tiles(panel, cells, values[id], scale, area)
+        _tiles(panel, cells, values[id], scale)
         some = np.isfinite(values[id]).any()
         title = f"{entry.name} ({'bound' if entry.kind == 'bound' else 'least possible'})"
         panel.set_title(title + ("" if some else ": no number"), loc="left", fontsize=10, pad=16)
-    figure.colorbar(scale, ax=list(axes), label="RMSE in m", shrink=0.85)
+    scale.bar(figure, list(axes), "RMSE in m")
     title = "Least RMSE of a device that is known to be in the cell"
     figure.suptitle(f"{plan.title}: {title[0].lower()}{title[1:]}" if plan.title else title, fontsize=11)
     return figure
@@ -144,7 +138,7 @@ def _panels(area: Any, anchors: ndarray, names: Sequence[str], n: int) -> tuple[
     outside = 0
     for panel in axes:
         outside = frame(panel, low, high, anchors)
-        draw_outline(panel, outline_of(area))
+        draw_outline(panel, area.shape)
         draw_anchors(panel, anchors, names)
         scale_bar(panel)
     return figure, axes, outside
@@ -157,23 +151,10 @@ def _extent(found: AccuracyMap) -> tuple[float, float, float, float]:
 
 
 def _image(figure: "Figure", panel: "Axes", values: Float[ndarray, "rows columns"], extent: Any, label: str) -> None:
-    from matplotlib.colors import LogNorm, Normalize
-    from matplotlib.ticker import LogLocator
-
-    some = values[np.isfinite(values)]
-    low, high = (float(some.min()), float(np.quantile(some, TOP))) if some.size else (0.0, 1.0)
-    if high - low < 1e-6 * max(high, 1e-300):  # one value everywhere
-        low, high = 0.0, high or 1.0
+    scale = colours(values)
     shown = np.where(np.isfinite(values), values, np.nan)
-    wide = low > 0 and high > LOGARITHMIC * low
-    scale = (LogNorm if wide else Normalize)(low, high)
-    image = panel.imshow(shown, origin="lower", extent=extent, cmap="viridis", norm=scale, zorder=1)
-    over = bool(some.size and some.max() > high * (1 + 1e-6))
-    bar = figure.colorbar(image, ax=panel, label=label, extend="max" if over else "neither", shrink=0.85)
-    if wide:
-        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        bar.ax.yaxis.set_major_formatter("{x:g}")
-        bar.ax.yaxis.set_minor_formatter("")
+    panel.imshow(shown, origin="lower", extent=extent, cmap=scale.cmap, norm=scale.norm, zorder=1)
+    scale.bar(figure, panel, label)
 
 
 def _mark(panel: "Axes", found: AccuracyMap, lost: ndarray, extent: Any) -> None:
@@ -214,22 +195,18 @@ def _ellipses(panel: "Axes", found: AccuracyMap) -> float:
     return factor
 
 
-def _tiles(panel: "Axes", cells: Sequence[Cell], values: ndarray, scale: Any, area: Any) -> None:
+def _tiles(panel: "Axes", cells: Sequence[Cell], values: ndarray, scale: Colours) -> None:
     """Coloured parts of cells with their number; hatched where there is none."""
     import shapely
     from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
 
-    whole = outline_of(area)
     for cell, value in zip(cells, values, strict=True):
-        part = whole.intersection(shapely.box(*cell.corners.ravel()))
         known = np.isfinite(value)
-        pieces = [g for g in getattr(part, "geoms", [part]) if g.geom_type == "Polygon"]
-        for g in pieces:
-            rings = [Path(np.asarray(ring.coords)[:, :2], closed=True) for ring in (g.exterior, *g.interiors)]
-            style = {"facecolor": scale.to_rgba(value)} if known else {"facecolor": "0.92", "hatch": "///"}
-            panel.add_patch(PathPatch(Path.make_compound_path(*rings), edgecolor="white", lw=0.6, zorder=1, **style))
+        style = {"facecolor": scale.cmap(scale.norm(value))} if known else {"facecolor": "0.92", "hatch": "///"}
+        for piece in shapely.get_parts(cell.part):
+            if piece.geom_type == "Polygon":
+                panel.add_patch(PathPatch(outline(piece), edgecolor="white", lw=0.6, zorder=1, **style))
         if known and len(cells) <= 60:
-            at = part.representative_point()
+            at = cell.part.representative_point()
             shade = "black" if scale.norm(value) > 0.6 else "white"
             panel.text(at.x, at.y, f"{value:.3g}", ha="center", va="center", fontsize=7, color=shade, zorder=6)

@@ -7,8 +7,10 @@ import numpy as np
 
 from locbounds.registry import method
 from locbounds.result import Result
-from locbounds.static.cells import Cell, Numbers, Refusal, choose, rmse_of
+from locbounds.static.cells import Cell
 from locbounds.static.maps import AccuracyMap
+from locbounds.static.over_prior import Numbers, Refusal, rmse_of
+from locbounds.static.tightest import choose
 
 STATUS = ("ok", "singular", "no derivative")
 METHOD_COLUMNS = ("method", "what", "rmse_m", "stderr_m", "verdict", "why")
@@ -56,7 +58,7 @@ def cell_rows(cells: Sequence[Cell], ids: Sequence[str]) -> list[tuple[Any, ...]
             got = rmse_of(cell.found.get(id))
             values += got[:1] if _bound(id) else got
         best = choose(cell.found)
-        chosen = (best.id, best.rmse_m, best.runner_up) if best else ("", "", "")
+        chosen = (best.best.id, best.rmse_m, best.runner_up.id if best.runner_up else "") if best else ("", "", "")
         refused = "; ".join(f"{r.id}: {r.why}" for r in cell.found.values() if isinstance(r, Refusal))
         numbers = ["" if v != v else v for v in values]
         rows.append((*map(float, cell.corners.ravel()), *numbers, *chosen, refused))

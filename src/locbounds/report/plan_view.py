@@ -1,7 +1,7 @@
-"""What every picture of a plan has: outline, anchors with names, a scale bar."""
+"""What every picture of a plan has: colours with a bar, outline, anchors with names, a scale bar."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -9,7 +9,12 @@ from locbounds.axes import Float, ndarray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
+TOP = 0.98  # quantile of the values at the top of a colour bar, so that a few bad places do not hide the rest
+LOGARITHMIC = 10.0  # a wider range of values has logarithmic colours
+ALIKE = 0.02  # a narrower range, relative to the largest value, is no pattern: colours then begin at zero
+MOST_TICKS = 12  # of whole numbers at a colour bar
 BARS_M = tuple(float(f"{k}e{e}") for e in range(-2, 5) for k in (1, 2, 5))
 FAR = 0.6  # anchors farther off than this, relative to the area's longer side, do not widen the picture
 
@@ -48,6 +53,78 @@ def draw_anchors(panel: "Axes", anchors: Float[ndarray, "anchors 2"], names: Seq
             annotation_clip=True,
         )
         text.set_path_effects([effects.withStroke(linewidth=2.5, foreground="white")])
+
+
+class Colours(NamedTuple):
+    """How values become colours.
+
+    Attributes
+    ----------
+    norm, cmap
+        Of matplotlib.
+    extend : str
+        ``"max"`` where there are values above the top of the bar.
+    ticks
+        Of the bar; None for matplotlib's own.
+    """
+
+    norm: Any
+    cmap: Any
+    extend: str
+    ticks: Any
+
+    def bar(self, figure: "Figure", panels: Any, label: str, *, shrink: float = 0.85) -> None:
+        """A colour bar beside axes."""
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import LogNorm
+
+        image = ScalarMappable(self.norm, self.cmap)
+        bar = figure.colorbar(image, ax=panels, label=label, extend=self.extend, shrink=shrink, ticks=self.ticks)
+        if isinstance(self.norm, LogNorm):
+            bar.ax.yaxis.set_major_formatter("{x:g}")
+            bar.ax.yaxis.set_minor_formatter("")
+
+
+def colours(values: Float[ndarray, "..."], high: float | None = None) -> Colours:
+    """Colours of values: logarithmic where they spread over more than a factor of 10, steps for few whole numbers.
+
+    Parameters
+    ----------
+    values
+        Of any shape; those that are not finite do not count.
+    high
+        Value at the top; by default the 98 % quantile.
+
+    Examples
+    --------
+    >>> scale = colours(np.append(np.arange(1.0, 200.0), np.inf))
+    >>> type(scale.norm).__name__, scale.norm.vmin, scale.extend, colours(np.array([0.0, 3.0, 1.0])).ticks.tolist()
+    ('LogNorm', 1.0, 'max', [0, 1, 2, 3])
+    """
+    from matplotlib import colormaps
+    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.ticker import LogLocator
+
+    some = values[np.isfinite(values)]
+    low, most = (float(some.min()), float(some.max())) if some.size else (0.0, 1.0)
+    if some.size and not np.any(some % 1) and (most if high is None else high) <= MOST_TICKS:
+        top = int(most if high is None else high)
+        steps = colormaps["viridis"].resampled(top + 1)
+        return Colours(Normalize(-0.5, top + 0.5), steps, "max" if most > top else "neither", np.arange(top + 1))
+    top = high if high is not None else float(np.quantile(some, TOP)) if some.size else 1.0
+    extend = "max" if most > top * (1 + 1e-6) else "neither"
+    if low > 0 and top > LOGARITHMIC * low:
+        return Colours(LogNorm(low, top), colormaps["viridis"], extend, LogLocator(subs=(1.0, 2.0, 5.0)))
+    return Colours(Normalize(low if top - low > ALIKE * top else 0.0, top or 1.0), colormaps["viridis"], extend, None)
+
+
+def outline(polygon: Any) -> Any:
+    """A Shapely polygon with its holes as one matplotlib path."""
+    import shapely
+    from matplotlib.path import Path
+
+    rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
+    return Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
 
 
 def draw_outline(panel: "Axes", shape: Any) -> None:

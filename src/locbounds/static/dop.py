@@ -56,6 +56,5 @@ def dop(
         [Observations(plan.measurements, np.diag(1 / w), names=[n for g in plan.groups for n in g.names])],
         clock_std_m=None if plan.clock_std_m is None else np.inf,
         prior=plan.prior,
-        area=plan.area,
     )
     return crlb(equal, points).dop(std=1.0)

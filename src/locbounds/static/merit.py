@@ -18,19 +18,45 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from locbounds.axes import Array, Float
+from locbounds.axes import Array, Bool, Float
 from locbounds.errors import InputError
 from locbounds.precision import double_precision, traced
 from locbounds.static.radius import check_share, numeric, radius_3d, radius_table
 
+ROUNDING = 1e-9  # of the largest eigenvalue: a covariance from rounded numbers may have one as far below zero
+
 
 def _square(covariance: Any) -> Any:
+    """A covariance, or many, as an array; raises for what is none. Infinite ones stand for "no bound" and pass."""
     covariance = covariance if traced(covariance) else np.asarray(covariance, dtype=float)
     if covariance.ndim < 2 or covariance.shape[-1] != covariance.shape[-2] or covariance.shape[-1] not in (1, 2, 3):
         raise InputError(
             f"the covariance of a position error has shape {covariance.shape}", "Give [..., space, space], 2-D or 3-D"
         )
+    if not traced(covariance):
+        for wrong, why in (
+            (np.isnan(covariance).any((-2, -1)), "holds NaN"),
+            (_indefinite(covariance), "has a negative variance"),
+        ):
+            if wrong.any():
+                raise InputError(
+                    f"the covariance {covariance[wrong][0].tolist()} of a position error {why}",
+                    "Give a positive semidefinite matrix, infinite where there is no bound",
+                )
     return covariance
+
+
+def _indefinite(C: Float[np.ndarray, "*n space space"]) -> Bool[np.ndarray, "*n"]:
+    """Whether the variance along some direction is negative by more than rounding."""
+    C = np.where(np.isfinite(C).all((-2, -1), keepdims=True), C, 0.0)
+    if C.shape[-1] == 2:
+        middle = 0.5 * (C[..., 0, 0] + C[..., 1, 1])
+        gap = np.hypot(0.5 * (C[..., 0, 0] - C[..., 1, 1]), C[..., 0, 1])
+        low, high = middle - gap, middle + gap
+    else:
+        values = np.linalg.eigvalsh(C)
+        low, high = values[..., 0], values[..., -1]
+    return np.asarray(low < -ROUNDING * np.abs(high))
 
 
 def mse(covariance: Float[Array, "*n space space"]) -> Float[Array, "*n"]:
@@ -93,7 +119,7 @@ def error_quantile(covariance: Float[Array, "*n space space"], share: float = 0.
     Raises
     ------
     InputError
-        If the share is no probability or the shape none of a covariance.
+        If the share is no probability, or the matrix no covariance: its shape, NaN, a negative variance.
 
     Notes
     -----
@@ -119,10 +145,8 @@ def error_quantile(covariance: Float[Array, "*n space space"], share: float = 0.
     return xp.where(finite, radius, np.inf)
 
 
-def principal_variances(a: Any, b: Any, d: Any, det: Any | None = None) -> tuple[Any, Any]:
+def principal_variances(a: Any, b: Any, d: Any) -> tuple[Any, Any]:
     """Larger and smaller eigenvalue of [[a, b], [b, d]]; derivatives free of NaN for circles.
-
-    The smaller one is the determinant over the larger: give the determinant if it is known without cancellation.
 
     >>> [float(v) for v in principal_variances(np.array(2.0), np.array(1.0), np.array(2.0))]
     [3.0, 1.0]
@@ -131,7 +155,7 @@ def principal_variances(a: Any, b: Any, d: Any, det: Any | None = None) -> tuple
     square = 0.25 * (a - d) ** 2 + b**2
     gap = xp.where(square > 0, xp.sqrt(xp.where(square > 0, square, 1.0)), 0.0)
     top = 0.5 * (a + d) + gap
-    det = xp.maximum(a * d - b**2, 0.0) if det is None else det
+    det = xp.maximum(a * d - b**2, 0.0)
     return top, xp.minimum(det / xp.where(top > 0, top, 1.0), top)
 
 
@@ -208,7 +232,8 @@ class SampleQuantile(NamedTuple):
 def sample_quantile(errors: Float[Array, " n"], share: float = 0.5, *, confidence: float = 0.95) -> SampleQuantile:
     """Quantile of measured or simulated error lengths, with an interval that holds for every law of the error.
 
-    The interval is between order statistics: the number of independent errors below the true quantile is binomial.
+    The interval is between order statistics: the number of independent errors below the true quantile is binomial
+    (:func:`scipy.stats.quantile_test`).
 
     Parameters
     ----------
@@ -229,16 +254,17 @@ def sample_quantile(errors: Float[Array, " n"], share: float = 0.5, *, confidenc
     >>> sample_quantile(np.arange(1.0, 101.0), 0.5)
     SampleQuantile(value=50.5, low=40.0, high=61.0)
     """
-    from scipy.stats import binom
+    from scipy.stats import quantile_test
 
-    e = np.sort(np.asarray(errors, dtype=float).ravel())
+    e = np.asarray(errors, dtype=float).ravel()
     if not len(e) or not np.all(np.isfinite(e)):
         raise InputError(f"there are {len(e)} errors, not all finite", "Give the lengths of errors in metres")
     for name, p in (("share", share), ("confidence", confidence)):
         if not 0 < p < 1:
             raise InputError(f"the {name} is {p}", "Give a number between 0 and 1")
-    n, tail = len(e), 0.5 * (1 - confidence)
-    # Pr(e_(i) > quantile) = Pr(Bin < i) <= tail, Pr(e_(j) < quantile) = Pr(Bin >= j) <= tail
-    i, j = int(binom.ppf(tail, n, share)), int(binom.ppf(1 - tail, n, share)) + 1
-    low, high = float(e[i - 1]) if i >= 1 else 0.0, float(e[j - 1]) if j <= n else float("inf")
-    return SampleQuantile(float(np.quantile(e, share)), low, high)
+    low, high = quantile_test(e, p=share).confidence_interval(confidence)
+    return SampleQuantile(
+        float(np.quantile(e, share)),
+        0.0 if np.isnan(low) else float(low),  # lengths are positive
+        float("inf") if np.isnan(high) else float(high),
+    )

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from locbounds.axes import Float, ndarray
+from locbounds.axes import Bool, Float, ndarray
 from locbounds.blocks import check_seed
 from locbounds.errors import InputError
 from locbounds.plan import Plan
@@ -56,11 +56,15 @@ class Posterior(NamedTuple):
     mean : array [draws, space]
     covariance : array [draws, space, space]
     likeliest : array [draws, space]
+    missed : array [draws]
+        Draws for which no node is possible (noise with limits): their moments are those of the few nodes that miss the
+        limits least, so that the covariance is too small.
     """
 
     mean: Float[ndarray, "draws space"]
     covariance: Float[ndarray, "draws space space"]
     likeliest: Float[ndarray, "draws space"]
+    missed: Bool[ndarray, " draws"]
 
 
 def draw(plan: Plan, law: Likelihood, runs: int, replicates: int, seed: int) -> Drawn:
@@ -101,6 +105,7 @@ def posterior(law: Likelihood, nodes: Nodes, drawn: Drawn) -> Posterior:
     count, space = drawn.places.shape
     mean, likeliest = np.empty((2, count, space))
     covariance = np.empty((count, space, space))
+    missed = np.zeros(count, bool)
     limits = noise_limits(law)
     for part, at in _blocks(law, limits, nodes, drawn, order):
         z = (drawn.measured[0][part], drawn.measured[1][part])
@@ -108,7 +113,7 @@ def posterior(law: Likelihood, nodes: Nodes, drawn: Drawn) -> Posterior:
         likeliest[part] = at.points[log.argmax(1)]
         log += at.log_weights
         top = log.max(1, keepdims=True)
-        missed = part[~np.isfinite(top[:, 0])]
+        missed[part] = ~np.isfinite(top[:, 0])
         weight = np.exp(np.where(np.isfinite(top), log - np.where(np.isfinite(top), top, 0.0), 0.0))
         weight /= weight.sum(1, keepdims=True)
         middle = at.points.mean(0)
@@ -117,11 +122,11 @@ def posterior(law: Likelihood, nodes: Nodes, drawn: Drawn) -> Posterior:
         square = weight @ (x[:, :, None] * x[:, None, :]).reshape(len(x), -1)
         covariance[part] = square.reshape(-1, space, space) - mean[part][:, :, None] * mean[part][:, None, :]
         mean[part] += middle
-        for one in missed:
+        for one in part[missed[part]]:
             points = nodes.points[_least_missed(limits, nodes, drawn.measured[1][one], 2**space)]
             mean[one], likeliest[one] = points.mean(0), points[0]
             covariance[one] = np.cov(points.T, bias=True).reshape(space, space)
-    return Posterior(mean, covariance, likeliest)
+    return Posterior(mean, covariance, likeliest, missed)
 
 
 def _neighbours_together(points: ndarray) -> ndarray:
@@ -294,8 +299,9 @@ def mmse(plan: Plan, *, rtol: float = 2e-3, draws: int | None = None, seed: int 
     Returns
     -------
     Result
-        ``covariance[0]`` is the mean posterior covariance; ``diagnostics`` hold ``nodes``, ``draws`` and
-        ``quadrature_error`` (the last relative change when the nodes were refined).
+        ``covariance[0]`` is the mean posterior covariance; ``diagnostics`` hold ``nodes``, ``draws``,
+        ``quadrature_error`` (the last relative change when the nodes were refined) and ``missed`` (draws that no node
+        explains: the verdict then warns that the error is too small).
 
     Notes
     -----
@@ -320,15 +326,21 @@ def mmse(plan: Plan, *, rtol: float = 2e-3, draws: int | None = None, seed: int 
         drawn = draw(plan, law, runs, REPLICATES, seed)
         if nodes is None:
             nodes, change = choose_nodes(plan, law, drawn, rtol / 2)
-        found = over_replicates(posterior(law, nodes, drawn).covariance, REPLICATES)
+        each = posterior(law, nodes, drawn)
+        found = over_replicates(each.covariance, REPLICATES)
         if draws is not None or found.relative_error <= rtol or runs >= MOST_RUNS:
             break
         runs = int(min(MOST_RUNS, 2 ** np.ceil(np.log2(runs * max(2.0, (found.relative_error / rtol) ** 2)))))
     if found.relative_error > rtol and draws is None:
         verdict = verdict._replace(warnings=(*verdict.warnings, f"relative standard error {found.relative_error:.1%}"))
-    verdict = not_refined(verdict, change, rtol)
+    verdict, missed = not_refined(verdict, change, rtol), int(each.missed.sum())
+    if missed:
+        text = (
+            f"no node is possible for {missed:,} of {runs * REPLICATES:,} draws: their part of the error is too small"
+        )
+        verdict = verdict._replace(warnings=(*verdict.warnings, text))
     how = f"posterior variance over {len(nodes.points):,} places, {REPLICATES} scrambled Sobol sets"
-    diagnostics = {"nodes": len(nodes.points), "draws": runs * REPLICATES, "quadrature_error": change}
+    diagnostics = {"nodes": len(nodes.points), "draws": runs * REPLICATES, "quadrature_error": change, "missed": missed}
     return static_result(
         "mmse", found.matrix, verdict, how, replicates=found.replicates, seed=seed, samples=runs * REPLICATES,
         diagnostics=diagnostics,

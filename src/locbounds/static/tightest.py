@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 from locbounds.errors import RefusedError
 from locbounds.plan import Plan
-from locbounds.registry import RANGES, bounds_of, load, method
+from locbounds.registry import RANGES, method
 from locbounds.result import Result
 from locbounds.result import tightest as of_results
+from locbounds.static.over_prior import Numbers, Refusal, over_prior, rmse_of
 from locbounds.verdict import Status
 
 CANDIDATES = ("bcrb", "wwb", "ezzb")
@@ -22,8 +23,6 @@ class Tightest(NamedTuple):
     ----------
     best : Result
     runner_up : Result or None
-    reason : str
-        Why this one, in a sentence.
     refused : dict
         Id -> why a bound does not apply.
 
@@ -38,11 +37,27 @@ class Tightest(NamedTuple):
 
     best: Result
     runner_up: Result | None
-    reason: str
     refused: dict[str, str]
 
+    @property
+    def rmse_m(self) -> float:
+        """Of the best, in metres."""
+        return rmse_of(self.best)[0]
+
+    @property
+    def reason(self) -> str:
+        """Why this one, in a sentence."""
+        text = f"{self.best.name} is the tightest valid bound over the prior: {self.rmse_m:.3f} m"
+        if self.runner_up is None:
+            return text
+        other = rmse_of(self.runner_up)[0]
+        above = f"{100 * (self.rmse_m / other - 1):.2g} % above" if other > 0 else "above"
+        return f"{text}, {above} {self.runner_up.name} ({other:.3f} m)"
+
     def __str__(self) -> str:
-        return self.reason
+        return "; ".join(
+            [self.reason, *(f"{method(id).name} does not apply: {why}" for id, why in self.refused.items())]
+        )
 
 
 def tightest(
@@ -71,7 +86,7 @@ def tightest(
     >>> import locbounds as lb
     >>> plan = lb.toa([[0, 15], [-13, -7.5], [13, -7.5]], 2.0, prior=lb.UniformDisc([0, 0], 15))
     >>> print(lb.tightest(plan))
-    EZZB is the tightest: 2.215 m, 4.4 % above WWB (2.121 m); BCRB does not apply: the density of a uniform law ...
+    EZZB is the tightest valid bound over the prior: 2.215 m, 4.4 % above WWB (2.121 m); BCRB does not apply: ...
     >>> [lb.tightest(lb.toa([[0, 15], [-13, -7.5], [13, -7.5]], std, prior=plan.prior)).best.id for std in (2.0, 12.0)]
     ['ezzb', 'wwb']
     >>> scenario = lb.papers.fritsche2013.scenario(stay=0.6, steps=3)
@@ -80,31 +95,40 @@ def tightest(
     """
     if not isinstance(subject, Plan):
         return of_results(list(subject), sees=sees)
-    found, refused = [], {}
-    for entry in [method("bcrb"), *(m for m in bounds_of("plan") if m.id in CANDIDATES)]:
-        verdict = entry.verdict(subject)
-        if verdict.status is not Status.VALID:
-            refused[entry.id] = "; ".join(verdict.reasons)
-            continue
-        try:
-            found.append(load(entry)(subject, rtol=rtol))
-        except RefusedError as error:
-            refused[entry.id] = error.cause
-    if not found:
-        raise RefusedError("no bound applies to this plan", "; ".join(f"{k}: {v}" for k, v in refused.items()))
-    found.sort(key=lambda r: -float(r.position_mse[0]))
-    best, runner_up = found[0], found[1] if len(found) > 1 else None
-    return Tightest(best, runner_up, _reason(best, runner_up, refused), refused)
-
-
-def _reason(best: Result, runner_up: Result | None, refused: dict[str, str]) -> str:
-    top = float(best.mean_position_rmse())
-    text = f"{best.name} is the tightest: {top:.3f} m"
-    if runner_up is not None:
-        other = float(runner_up.mean_position_rmse())
-        text += (
-            f", {100 * (top / other - 1) if other > 0 else float('inf'):.2g} % above {runner_up.name} ({other:.3f} m)"
+    numbers = over_prior(subject, CANDIDATES, rtol=rtol)
+    found = choose(numbers)
+    if found is None:
+        raise RefusedError(
+            "no bound applies to this plan", "; ".join(f"{k}: {v}" for k, v in _refused(numbers).items())
         )
-    for id, why in refused.items():
-        text += f"; {method(id).name} does not apply: {why}"
-    return text
+    return found
+
+
+def choose(found: Numbers) -> Tightest | None:
+    """The largest of the valid bounds; None if there is none. Estimators are passed over.
+
+    Examples
+    --------
+    >>> import locbounds as lb
+    >>> plan = lb.toa([[0, 15], [-13, -7], [13, -7]], 2.0, prior=lb.UniformDisc([0, 0], 15))
+    >>> choose(over_prior(plan, ["bcrb", "wwb", "ezzb"], rtol=1e-3)).reason
+    'EZZB is the tightest valid bound over the prior: 2.214 m, 4.4 % above WWB (2.121 m)'
+    """
+    valid = [r for r in found.values() if _is_valid_bound(r)]
+    if not valid:
+        return None
+    best, *others = sorted(valid, key=lambda r: -rmse_of(r)[0])
+    return Tightest(best, others[0] if others else None, _refused(found))
+
+
+def _is_valid_bound(found: Result | Refusal) -> TypeGuard[Result]:
+    return isinstance(found, Result) and found.kind == "bound" and found.verdict.status is Status.VALID
+
+
+def _refused(found: Numbers) -> dict[str, str]:
+    """Bounds that are not valid, and why."""
+    return {
+        id: r.why if isinstance(r, Refusal) else "; ".join(r.verdict.reasons)
+        for id, r in found.items()
+        if method(id).kind == "bound" and not _is_valid_bound(r)
+    }

@@ -122,9 +122,9 @@ def longest(support: Support, pattern: ndarray) -> float:
 
 def equal_lengths(
     support: Support, law: PairLaw, scales: Sequence[float], *, form: str = "support", n: int = NODES,
-    lengths: ndarray | None = None, pattern: ndarray | None = None,
+    lengths: ndarray | None = None,
 ) -> tuple[list[Best], Swept]:  # fmt: skip
-    """Supremum over the length h of the test vectors ``h * pattern`` (by default h I), for several noise levels.
+    """Supremum over the length h of the test vectors ``h I``, for several noise levels.
 
     Parameters
     ----------
@@ -132,10 +132,8 @@ def equal_lengths(
         ``"support"``, or ``"printed"`` for the chapter's (18).
     lengths
         Swept beside those that are always swept, m.
-    pattern
-        [space, points].
     """
-    pattern = np.eye(support.space) if pattern is None else pattern
+    pattern = np.eye(support.space)
     grams = FORMS[form]
     top = longest(support, pattern)
     coarse = max(3, 2 * n // 3)  # to search on
@@ -233,8 +231,7 @@ def at_vectors(support: Support, law: PairLaw, H: ndarray, form: str, n: int) ->
     """The bound of given test vectors, on two sets of nodes."""
     grams = FORMS[form]
     coarse, fine = (kernel.bound_matrices(H, grams(support, law, [H], k, [1.0])[0])[0] for k in (n, n + n // 2 + 1))
-    change = np.sqrt(np.trace(fine) / max(np.trace(coarse), 1e-300)) - 1
-    return Best(fine, H, float(abs(change)) if np.trace(fine) > 0 else 0.0)
+    return Best(fine, H, relative_change(coarse, fine))
 
 
 def diagonal(support: Support, law: PairLaw, start: Best, form: str, n: int) -> Best:

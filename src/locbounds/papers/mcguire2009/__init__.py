@@ -17,13 +17,11 @@ from locbounds.papers.mcguire2009.simple import (
 from locbounds.papers.mcguire2009.statements import Statement, on_maximum_likelihood, statements
 from locbounds.papers.mcguire2009.streets import fig7_figure, fig8, fig8_figure, street_statements
 from locbounds.papers.mcguire2009.survey_set import (
-    DATA,
     PUBLISHED_FIG9,
     REMARKS,
     SETS,
     PublishedSurvey,
     SurveySet,
-    data_folder,
     fig9,
     fig9_csv,
     fig9_figure,
@@ -33,7 +31,6 @@ FIGURES = ("fig3", "fig4", "fig5", "fig6", "fig7", "fig8", "fig9")
 
 __all__ = [
     "CASES",
-    "DATA",
     "FIGURES",
     "FIGURE_OF",
     "PUBLISHED_FIG9",
@@ -45,7 +42,6 @@ __all__ = [
     "Statement",
     "SurveySet",
     "case_rows",
-    "data_folder",
     "fig7_figure",
     "fig8",
     "fig8_figure",

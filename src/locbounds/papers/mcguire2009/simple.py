@@ -14,6 +14,7 @@ import numpy as np
 from locbounds.axes import Float, ndarray
 from locbounds.plan import Plan, aoa, rss, tdoa, toa
 from locbounds.priors import UniformDisc
+from locbounds.static.crlb import crlb
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +30,7 @@ METRES = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
 DECIBELS = (0.5, 1.0, 2.0, 4.0, 8.0)
 RADIANS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 CRLB_NODES = (60, 90)  # along a line
-STEPS = 1e-3
+SMALL_SIGMA = 1e-3  # where angles are not wide: information scales with the noise from there on
 
 
 class Case(NamedTuple):
@@ -132,9 +133,7 @@ def expected_crlb(case: Case) -> tuple[float, float]:
     found = []
     for n in CRLB_NODES:
         points, weights = disc().nodes(n)
-        J = np.asarray(_unit_plan(case).information(points)) * STEPS**2
-        determinant = J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] ** 2
-        found.append(np.sqrt(weights @ (np.trace(J, axis1=1, axis2=2) / determinant)))
+        found.append(np.sqrt(weights @ np.square(crlb(case.plan(SMALL_SIGMA), points).rmse)) / SMALL_SIGMA)
     return float(found[1]), float(abs(found[1] - found[0]))
 
 
@@ -146,13 +145,8 @@ def inverse_expected_information(case: Case) -> float:
     if case.kind in ("RSS", "AoA"):
         return 0.0
     points, weights = disc().nodes(CRLB_NODES[1])
-    J = np.einsum("n,nab->ab", weights, np.asarray(_unit_plan(case).information(points))) * STEPS**2
-    return float(np.sqrt(np.trace(np.linalg.inv(J))))
-
-
-def _unit_plan(case: Case) -> Plan:
-    """At a small noise level, where angles are not wide: information scales."""
-    return case.plan(STEPS)
+    J = np.einsum("n,nab->ab", weights, np.asarray(case.plan(SMALL_SIGMA).information(points)))
+    return float(np.sqrt(np.trace(np.linalg.inv(J)))) / SMALL_SIGMA
 
 
 def case_rows(

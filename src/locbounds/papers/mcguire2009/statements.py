@@ -8,6 +8,19 @@ from typing import NamedTuple
 from locbounds.papers.mcguire2009.simple import CASES, Row, inverse_expected_information
 
 HOLDS, PARTLY, FAILS = "holds", "holds in part", "does not hold"
+TIGHT = 0.7  # of the least RMSE: what "fairly tight" is taken to mean
+GOOD = 0.85  # and "good"
+ALIKE = 0.15  # relative difference: "nearly identical"
+
+
+def word(each: Iterable[bool]) -> str:
+    """Whether a claim holds: everywhere, somewhere, nowhere.
+
+    >>> word([True, True]), word([True, False]), word([False])
+    ('holds', 'holds in part', 'does not hold')
+    """
+    each = list(each)
+    return HOLDS if all(each) else PARTLY if any(each) else FAILS
 
 
 class Statement(NamedTuple):
@@ -41,7 +54,7 @@ def statements(found: Mapping[str, Iterable[Row]]) -> list[Statement]:
         said.append(
             Statement(
                 "Figs. 3 and 4: the Weiss-Weinstein bound is nearly identical for both radii",
-                HOLDS if most < 0.15 else FAILS,
+                word(abs(r - 1) < ALIKE for r in ratio.values()),
                 f"as printed the two differ by at most {most:.0%}, while the least errors differ by up to {mmse:.0%}",
             )
         )
@@ -49,16 +62,7 @@ def statements(found: Mapping[str, Iterable[Row]]) -> list[Statement]:
         case = values.get(f"{kind} R_BS=5 m")
         if case:
             said.append(_order(case, f"Fig. {number}: for {kind} the Ziv-Zakai bound is the better one"))
-            tight = [case["EZZB"][s] / m for s, m in case["MMSE"].items()]
-            said.append(
-                Statement(
-                    f"Fig. {number}: both bounds are fairly tight",
-                    PARTLY,
-                    f"EZZB is {min(tight):.0%} to {max(tight):.0%} of the least error, WWB "
-                    f"{min(case['WWB'][s] / m for s, m in case['MMSE'].items()):.0%} to "
-                    f"{max(case['WWB'][s] / m for s, m in case['MMSE'].items()):.0%}",
-                )
-            )
+            said.append(_tight(case, f"Fig. {number}: both bounds are fairly tight"))
     return said
 
 
@@ -79,23 +83,36 @@ def on_maximum_likelihood(*, seed: int = 0) -> Statement:
     texts = [f"{value:.2f} ± {error:.2f} m" for value, error in errors]
     return Statement(
         "Fig. 3: the inverse expected information is a lower bound for maximum likelihood, which uses no prior",
-        FAILS if all(below) else PARTLY if any(below) else HOLDS,
+        word(not b for b in below),
         f"at {sigma:g} m it is {claimed:.2f} m, the error of maximum likelihood {texts[0]} if searched in the disc, "
         f"{texts[1]} in a box three times as wide: at high noise the estimate is biased",
     )
 
 
-def _order(case: dict[str, dict[float, float]], text: str) -> Statement:
-    above = {name: [s for s, v in case["EZZB"].items() if v < case[name][s]] for name in ("WWB as printed", "WWB")}
-    if not above["WWB as printed"] and not above["WWB"]:
-        return Statement(text, HOLDS, "at every noise level, for both forms of the Weiss-Weinstein bound")
-
-    def where(levels: list[float]) -> str:
-        return f"not at {', '.join(f'{s:g}' for s in levels)}" if levels else "at every noise level"
-
-    verdict = PARTLY if above["WWB as printed"] or above["WWB"] else HOLDS
+def _tight(case: dict[str, dict[float, float]], text: str) -> Statement:
+    share = {name: [case[name][s] / m for s, m in case["MMSE"].items()] for name in ("EZZB", "WWB")}
+    spans = [f"{name} has {min(v):.0%} to {max(v):.0%}" for name, v in share.items()]
     return Statement(
-        text, verdict, f"form as printed: {where(above['WWB as printed'])}; with the support: {where(above['WWB'])}"
+        text,
+        word(v >= TIGHT for each in share.values() for v in each),
+        f"taken as {TIGHT:.0%} of the least error or more: {', '.join(spans)}",
+    )
+
+
+def _order(case: dict[str, dict[float, float]], text: str) -> Statement:
+    forms = {"WWB as printed": "form as printed", "WWB": "with the support"}
+    larger = {name: {s: v >= case[name][s] for s, v in case["EZZB"].items()} for name in forms}
+
+    def where(at: dict[float, bool]) -> str:
+        if all(at.values()):
+            return "at every noise level"
+        levels = ", ".join(f"{s:g}" for s, yes in at.items() if not yes)
+        return f"not at {levels}" if any(at.values()) else "at no noise level"
+
+    return Statement(
+        text,
+        word(yes for at in larger.values() for yes in at.values()),
+        "; ".join(f"{words}: {where(larger[name])}" for name, words in forms.items()),
     )
 
 
@@ -114,7 +131,7 @@ def _low_noise(case: dict[str, dict[float, float]]) -> Statement:
     better = max(case["WWB"][s] / case["WWB as printed"][s] for s in share) - 1
     return Statement(
         "Fig. 3: the Weiss-Weinstein bound is good at low noise and becomes loose at high noise",
-        HOLDS if share[first] > 0.85 and share[worst] < share[first] else PARTLY,
+        word([share[first] > GOOD, share[worst] < share[first]]),
         f"as printed {share[first]:.0%} of the least error at {first:g} m and {share[worst]:.0%} at {worst:g} m; much "
         f"of that is the form: with the support it is up to {better:.0%} larger",
     )

@@ -17,7 +17,7 @@ import shapely
 
 from locbounds.axes import LOS, Float, ndarray
 from locbounds.papers.mcguire2009.simple import ESTIMATE, VALID, Row
-from locbounds.papers.mcguire2009.statements import FAILS, HOLDS, Statement
+from locbounds.papers.mcguire2009.statements import FAILS, HOLDS, TIGHT, Statement, word
 from locbounds.plan import Observations, Plan
 from locbounds.precision import double_precision
 from locbounds.propagation import City, StreetCell, StreetRanges, street_cells, street_links
@@ -31,7 +31,7 @@ IN_USE = 3
 SIGMAS_M = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 STREET_CASES = ("ToA", "TDoA")
 NODES, FINER = 10, 16  # of the quadrature, along a side
-RARELY, SLIGHTLY, TIGHT = 0.05, 10.0, 0.7  # share of places; %; of the least RMSE: what the words are taken to mean
+RARELY, SLIGHTLY = 0.05, 10.0  # share of places; %: what the words are taken to mean
 GRID = (14, 9)  # lengths along and across the street that are tried first
 ZOOMS, AROUND = 4, (-1.0, 0.0, 1.0)
 
@@ -105,8 +105,8 @@ def plan(case: str = "ToA", sigma_m: float = 1.0) -> Plan:
     return Plan([Observations([ranges], covariance)], prior=cell.prior)
 
 
-class Statements(NamedTuple):
-    """What the chapter says of this city, measured on the streets.
+class Sights(NamedTuple):
+    """What the chapter says of sight in this city, measured on the streets.
 
     Attributes
     ----------
@@ -121,12 +121,12 @@ class Statements(NamedTuple):
     corners: float
 
 
-def statements(nodes: int = 60) -> Statements:
+def sight_shares(nodes: int = 60) -> Sights:
     """Sight and corners on one stretch, by quadrature.
 
     Examples
     --------
-    >>> found = statements(20)
+    >>> found = sight_shares(20)
     >>> found.nearest_los, found.corners, bool(found.other_los < 0.03)
     (1.0, 1.0, True)
     """
@@ -135,7 +135,7 @@ def statements(nodes: int = 60) -> Statements:
     links = street_links(city(), places, points)
     free = weights @ (links.sight == LOS)
     bends = [len(links.path(i, m)) - 2 for i, m in np.argwhere(links.sight != LOS)[:: nodes // 4].tolist()]
-    return Statements(round(float(free[0]), 12), float(free[1:].mean()), float(np.mean(np.array(bends) == 1)))
+    return Sights(round(float(free[0]), 12), float(free[1:].mean()), float(np.mean(np.array(bends) == 1)))
 
 
 @double_precision
@@ -259,7 +259,7 @@ def street_statements(rows: Iterable[Row]) -> list[Statement]:
     >>> found[1].verdict, found[1].why
     ('does not hold', 'by 20.0 to 20.0 % in the least RMSE')
     """
-    found = statements()
+    found = sight_shares()
     known = {(row.case, row.sigma, row.method): row.rmse_m for row in rows}
     sigmas = list(dict.fromkeys(sigma for _, sigma, _ in known))
     cases = list(dict.fromkeys(case for case, _, _ in known))
@@ -275,12 +275,12 @@ def street_statements(rows: Iterable[Row]) -> list[Statement]:
         ),
         Statement(
             "Fig. 8: TDoA is slightly worse than ToA",
-            HOLDS if min(worse) > 0 and max(worse) < SLIGHTLY else FAILS,
+            word(0 < w < SLIGHTLY for w in worse),
             f"by {_span(worse, '.1f')} % in the least RMSE",
         ),
         Statement(
             "Fig. 8: the Weiss-Weinstein bound is fairly tight",
-            HOLDS if min(tight) > TIGHT else FAILS,
+            word(t >= TIGHT for t in tight),
             f"{_span(tight, '.2f')} of the least RMSE, with a length of its own along and across the street; the noise "
             "of the figure is not printed",
         ),
@@ -333,8 +333,8 @@ def fig7_figure() -> Figure:
     from matplotlib.figure import Figure
     from matplotlib.patches import PathPatch
 
-    from locbounds.report.city_plot import draw_buildings, draw_paths, outline
-    from locbounds.report.plan_view import draw_anchors
+    from locbounds.report.city_plot import draw_buildings, draw_paths
+    from locbounds.report.plan_view import draw_anchors, outline
 
     cell, places = stretch()
     whole = city(3)

@@ -7,7 +7,6 @@ that it stands beside the rigorous one, marked.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,13 +14,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from locbounds.errors import InputError
+from locbounds.papers.data import data_folder
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from locbounds.survey.study import SurveyStudy
-
-DATA = "LOCBOUNDS_DATA"
 
 
 class PublishedSurvey(NamedTuple):
@@ -79,26 +77,6 @@ SETS = (
 )
 
 
-def data_folder(folder: str | Path | None) -> Path:
-    """The folder of the data sets: the one given, or the one that ``LOCBOUNDS_DATA`` names.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    named = folder or os.environ.get(DATA)
-    if not named:
-        raise InputError(
-            "Fig. 9 needs measured surveys, which are not part of locbounds",
-            f"Name the folder that holds {', '.join(dict.fromkeys(s.folder for s in SETS))} with --data or in {DATA}",
-        )
-    path = Path(named).expanduser()
-    if not path.is_dir():
-        raise InputError(f"there is no folder {path}", "Check --data")
-    return path
-
-
 def fig9(
     data: str | Path | None = None,
     *,
@@ -127,7 +105,7 @@ def fig9(
     from locbounds.io.surveys import read_survey
     from locbounds.survey.study import study
 
-    root, found = data_folder(data), {}
+    root, found = data_folder(data, [s.folder for s in sets], "Fig. 9"), {}
     for s in sets:
         path = root / s.folder
         if not path.is_dir():
