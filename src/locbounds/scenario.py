@@ -10,7 +10,7 @@ import numpy as np
 
 from locbounds.axes import Array, Bool, Float
 from locbounds.errors import InputError
-from locbounds.measurement import BySight, Range
+from locbounds.measurement import BySight, Measurement
 from locbounds.motion import Motion, SwitchingMotion
 from locbounds.noise import Noise
 from locbounds.precision import traced
@@ -53,7 +53,7 @@ class Link(eqx.Module):
     """
 
     name: str = eqx.field(static=True)
-    measurement: Range | BySight
+    measurement: Measurement | BySight
     sight: Sight
     noises: tuple[Noise, ...]
     reports: Bool[Array, " steps"] | None = None

@@ -14,7 +14,7 @@ from locbounds.bounds.bcrb_of_plan import bcrb_of_plan
 from locbounds.bounds.common import bound_result, further_information, prepare
 from locbounds.bounds.corrected import corrected
 from locbounds.bounds.expectation import Expectation
-from locbounds.bounds.general import general, model_verdict
+from locbounds.bounds.general import general
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
 from locbounds.bounds.score_covariance import NoiseProcess, noise_process, score_covariance_increments
 from locbounds.bounds.separated import SeparatedIncrements, geometry
@@ -24,6 +24,7 @@ from locbounds.horizon import Horizon
 from locbounds.model import JumpMarkov, jump_markov
 from locbounds.plan import Plan
 from locbounds.precision import double_precision, traced
+from locbounds.registry import method
 from locbounds.result import Result
 from locbounds.scenario import Scenario, beyond_separation
 from locbounds.sight import KnownSight
@@ -211,7 +212,7 @@ def _by_general_engine(scenario, rtol, samples, seed, expectation, window, progr
             "Transform a scenario with links of their own chains and a motion without modes",
         )
     if isinstance(scenario, JumpMarkov):
-        verdict, model, why = model_verdict(scenario), scenario, "the model is a JumpMarkov"
+        verdict, model, why = method("bcrb").verdict(scenario), scenario, "the model is a JumpMarkov"
         if verdict.status is Status.REFUSED:
             raise RefusedError(f"bcrb does not apply: {'; '.join(verdict.reasons)}", "See: locbounds explain bcrb")
     else:
