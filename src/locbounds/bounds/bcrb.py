@@ -147,7 +147,8 @@ def bcrb(
     Raises
     ------
     RefusedError
-        If an assumption is violated (see ``locbounds explain bcrb``), or the engine has no such horizon.
+        If an assumption is violated (see ``locbounds explain bcrb``; functions of one's own are searched for jumps and
+        for slopes without a finite mean square), or the engine has no such horizon.
     InputError
         If an option makes no sense, or the horizon lies beyond the record.
 

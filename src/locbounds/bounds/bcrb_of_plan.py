@@ -70,10 +70,10 @@ def bcrb_of_plan(plan: Plan, *, rtol: float = 1e-3) -> Result:
     if not np.all(np.isfinite(J)):
         raise RefusedError(
             "the expected information is not a number: a measurement has no derivative where the prior is positive",
-            "Make its function differentiable there (the square root at zero and 0/0 are not); ezzb needs no derivative",
+            "Make its function differentiable there (the root of zero and 0/0 are not); ezzb needs no derivative",
         )
     if not change <= rtol:
-        doubt = f"the expected information may be infinite: more nodes changed it by {change:.1%} at last"
+        doubt = f"the expected information may be infinite: more nodes changed it by {change:.1%}"
         reasons = verdict.reasons if verdict.status is not Status.VALID else ()
         verdict = verdict._replace(status=Status.UNDECIDED, reasons=(doubt, *reasons))
     matrix = np.linalg.inv(J)
