@@ -15,7 +15,7 @@ import numpy as np
 from locbounds.assumptions.reach import looked_at, meets, position_laws, states
 from locbounds.axes import Array, ndarray
 from locbounds.measurement import BySight, is_own, pole
-from locbounds.model import AdditiveChannel, DensityMotion, JumpMarkov, jump_markov
+from locbounds.model import AdditiveChannel, DensityMotion, JumpMarkov
 from locbounds.model.from_scenario import LinkFunction
 from locbounds.plan_assumptions import steep_words
 from locbounds.precision import double_precision, traced
@@ -141,12 +141,11 @@ def _searched(subject: Scenario | JumpMarkov) -> Findings:
     own = [f for f in functions(subject) if f.own]
     if not own:
         return Findings()
-    model = jump_markov(subject) if isinstance(subject, Scenario) else subject
-    surely_positive = not (isinstance(model.motion, DensityMotion) or isinstance(model.prior, DensityPrior))
-    x = states(model)
+    surely_positive = not (isinstance(subject.motion, DensityMotion) or isinstance(subject.prior, DensityPrior))
+    x = states(subject)
     found = Findings()
     for f in own:
-        k = looked_at(f.reports, model.steps)
+        k = looked_at(f.reports, subject.steps)
         if not len(k):
             continue
         one = _search(f, x[k][..., f.view], k, surely_positive)

@@ -14,6 +14,7 @@ from locbounds.paths import moving_states
 from locbounds.priors import GaussianPrior
 from locbounds.scenario import Scenario
 from locbounds.sight.draws import draw_sight
+from locbounds.simulation import draw_states
 
 DRAWS, FEWEST = 512, 32  # per step
 NUMBERS = 2**21  # kept at most, where there are many steps
@@ -68,19 +69,24 @@ def looked_at(reports: Any, steps: int) -> Int[ndarray, " looked_at"]:
     return there[np.unique(np.linspace(0, len(there) - 1, STEPS).round().astype(int))] if len(there) else there
 
 
-def states(model: JumpMarkov) -> Float[ndarray, "times n state"]:
+def states(subject: Scenario | JumpMarkov) -> Float[ndarray, "times n state"]:
     """Draws of the state at steps 0..K."""
-    n = int(np.clip(NUMBERS // ((model.steps + 1) * model.state_size), FEWEST, DRAWS))
-    return np.asarray(_states(_only_states(model), n))
-
-
-def _only_states(model: JumpMarkov) -> tuple[Any, Any, Any]:
-    start, chain = model.chains[model.motion_chain].start, model.transitions(model.motion_chain)
-    return eqx.tree_at(lambda m: m.channels, model, ()), jnp.asarray(start), chain
+    size = subject.motion.state_size if isinstance(subject, Scenario) else subject.state_size
+    n = int(np.clip(NUMBERS // ((subject.steps + 1) * size), FEWEST, DRAWS))
+    if isinstance(subject, Scenario):
+        few = eqx.tree_at(lambda s: s.links, subject.anonymous(), subject.anonymous().links[:1])
+        return np.moveaxis(np.asarray(_of_scenario(few, n)), 0, 1)
+    start, chain = subject.chains[subject.motion_chain].start, subject.transitions(subject.motion_chain)
+    few = eqx.tree_at(lambda m: (m.channels, m.chains), subject, ((), subject.chains[: subject.motion_chain + 1]))
+    return np.asarray(_of_model(few, jnp.asarray(start), chain, n))
 
 
 @eqx.filter_jit
-def _states(what: tuple[Any, Any, Any], n: int) -> Array:
-    model, start, chain = what
+def _of_scenario(scenario: Scenario, n: int) -> Array:
+    return draw_states(jax.random.key(0), scenario, n)
+
+
+@eqx.filter_jit
+def _of_model(model: JumpMarkov, start: Array, chain: Array, n: int) -> Array:
     one, two = jax.random.split(jax.random.key(0))
     return moving_states(one, model, draw_sight(two, start, chain, n), n)
