@@ -86,7 +86,7 @@ SMOOTH = {"std": 1e-2, "anchor": 1e-1, "intensity": 1e-3, "prior_std": 1e-2}  # 
 AT = {"std": 3.0, "anchor": -60.0, "intensity": 0.4, "prior_std": 8.0, "stay": 0.85}
 
 
-@pytest.fixture(scope="module", params=BOUNDS)
+@pytest.fixture(scope="module", params=["bcrb", pytest.param("enumer", marks=pytest.mark.slow)])
 def gradients(request):
     """Gradients of a bound on the draws of several seeds, with respect to all of AT."""
     with jax.enable_x64(True):

@@ -19,6 +19,7 @@ def test_where_both_sights_are_alike_two_passes_suffice_and_it_is_the_kalman_fil
     assert not found.verdict.warnings
 
 
+@pytest.mark.slow
 def test_what_has_not_converged_says_so():
     found = lb.reference(awkward(2), runs=8, rtol=1e-9, most=200)
     assert "not converged: from 50 to 200 particles" in found.verdict.warnings[-1]

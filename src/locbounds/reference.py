@@ -67,8 +67,8 @@ def reference(
     Examples
     --------
     >>> import locbounds as lb
-    >>> scenario = lb.papers.fritsche2013.scenario(stay=0.9, steps=5)
-    >>> best = reference(scenario, runs=200)
+    >>> scenario = lb.papers.fritsche2013.scenario(stay=0.9, steps=3)
+    >>> best = reference(scenario, runs=100)
     >>> best.verdict.warnings, best.efficiency(lb.bcrb(scenario)).high > 0.9
     ((), True)
     """

@@ -11,6 +11,7 @@ import numpy as np
 
 from locbounds.axes import Array, Float, Int
 from locbounds.blocks import Stream, block_key, check_seed
+from locbounds.cores import on_all_cores
 from locbounds.errors import InputError
 from locbounds.linalg import psd_root
 from locbounds.model import JumpMarkov, jump_markov
@@ -159,7 +160,7 @@ def simulate_block(scenario: Scenario | JumpMarkov, *, seed: int, block: int) ->
     """One block of :data:`RUNS_PER_BLOCK` tracks of :func:`simulate`: for more runs than fit into memory.
 
     >>> import locbounds as lb
-    >>> scenario = lb.papers.fritsche2013.scenario(steps=10)
+    >>> scenario = lb.papers.fritsche2013.scenario(steps=3)
     >>> few = lb.simulate(scenario, runs=3, seed=1).states
     >>> bool(np.all(simulate_block(scenario, seed=1, block=0).states[:3] == few))
     True
@@ -217,8 +218,11 @@ def simulate(scenario: Scenario | JumpMarkov, *, runs: int, seed: int = 0) -> Dr
     """
     if runs < 1 or int(runs) != runs:
         raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 1")
-    draw = _drawing(scenario, seed)
-    blocks = [draw(b) for b in range(-(-runs // RUNS_PER_BLOCK))]
+    draw, later = _drawing(scenario, seed), range(1, -(-runs // RUNS_PER_BLOCK))
     if traced(scenario):
-        return jax.tree.map(lambda *parts: jnp.concatenate(parts)[:runs], *blocks)
-    return jax.tree.map(lambda *parts: np.concatenate([np.asarray(part) for part in parts])[:runs], *blocks)
+        return jax.tree.map(lambda *parts: jnp.concatenate(parts)[:runs], draw(0), *map(draw, later))
+
+    def drawn(block: int) -> Draws:
+        return jax.tree.map(np.asarray, draw(block))
+
+    return jax.tree.map(lambda *parts: np.concatenate(parts)[:runs], drawn(0), *on_all_cores(drawn, later))

@@ -49,7 +49,7 @@ SCENARIOS = {
 }
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", [*list(SCENARIOS)[:-1], pytest.param(list(SCENARIOS)[-1], marks=pytest.mark.slow)])
 def test_separated_engine_against_algorithm_1(name):
     scenario = SCENARIOS[name]()
     a = lb.bcrb(scenario, samples=SAMPLES, window=STEPS)

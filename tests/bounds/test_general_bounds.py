@@ -106,6 +106,7 @@ def three_modes():
     )
 
 
+@pytest.mark.slow
 def test_three_modes_shared_by_two_channels_against_joint_enumeration():
     model, n = three_modes(), 16384
     draws = lb.simulate(model, runs=n, seed=3)

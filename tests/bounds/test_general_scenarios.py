@@ -43,7 +43,9 @@ def agree(a, b):
 BEYOND = {"share a chain": shared, "the motion switches": turning, "depends on the sight": reflected}
 
 
-@pytest.mark.parametrize("reason", BEYOND)
+@pytest.mark.parametrize(
+    "reason", ["share a chain", *(pytest.param(reason, marks=pytest.mark.slow) for reason in list(BEYOND)[1:])]
+)
 def test_the_engine_is_chosen_and_the_result_says_why(plain, reason):
     scenario = BEYOND[reason](plain)
     assert reason in beyond_separation(scenario)
@@ -74,6 +76,7 @@ def test_one_name_for_two_chains_is_an_input_error(plain):
         )
 
 
+@pytest.mark.slow
 def test_names_that_nobody_shares_and_motions_that_are_equal_change_nothing(plain):
     """The general engine on what the separated one can do, by ways that the dispatch cannot see through."""
     separated = lb.bcrb(plain, samples=4096)

@@ -12,7 +12,13 @@ ROUNDING = 1e-8  # metres; the same algebra in another order
 
 
 @pytest.mark.parametrize(
-    "options", [{"dim": 2, "outliers": True}, pytest.param({"dim": 3}, marks=pytest.mark.slow)], ids=str
+    "options",
+    [
+        {"dim": 2},
+        pytest.param({"dim": 2, "outliers": True}, marks=pytest.mark.slow),
+        pytest.param({"dim": 3}, marks=pytest.mark.slow),
+    ],
+    ids=str,
 )
 def test_linear_cost_equals_the_quadratic_textbook(options):
     scenario = awkward(**options)
@@ -33,6 +39,7 @@ def test_one_link_is_the_joint_filter():
     np.testing.assert_allclose(np.asarray(ours.covariance), np.asarray(joint.covariance), rtol=1e-9, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_as_accurate_as_the_joint_filter(paper):
     """Paired over the same tracks: the mean square errors agree within 4 standard errors and within 1 %."""
     scenario, draws = paper

@@ -89,6 +89,7 @@ def test_a_second_start_finds_the_position_across_the_base_line():
     np.testing.assert_allclose(ImmKf()(scenario, z).mean[0, 1:, :2], np.tile(truth, (3, 1)), atol=1.0)
 
 
+@pytest.mark.slow
 def test_collinear_anchors_stay_on_the_side_where_the_track_began():
     scenario = awkward(2)
     noise = lb.Gaussian(0.0, 5.0)

@@ -53,6 +53,7 @@ def test_agrees_with_particles_one_after_the_other():
         assert np.max(np.abs(a.mean(0) - b.mean(0))[1:] / error) < 5
 
 
+@pytest.mark.slow
 def test_a_track_does_not_depend_on_the_others():
     scenario = awkward(2)
     z = lb.simulate(scenario, runs=20, seed=4).measurements

@@ -75,6 +75,7 @@ def test_merged_steps_hold_the_ranges_of_a_burst(tmp_path):
     np.testing.assert_array_equal(thin.tracks[0].ranges_m, together.tracks[0].ranges_m[3::4])
 
 
+@pytest.mark.slow
 def test_anchors_of_every_track_are_its_own(tmp_path):
     write(tmp_path, lag=0.0, shift=2.0, outliers=0.0)
     log = read(tmp_path, merge_s=0.02)

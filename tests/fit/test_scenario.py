@@ -88,6 +88,7 @@ def test_scenario_has_the_parameters_that_made_the_log(log):
     assert np.isfinite(simulate(scenario, runs=2, seed=0).states).all()
 
 
+@pytest.mark.slow
 def test_each_anchor_its_own(log):
     fitted = fit_scenario(log, per_anchor=True, psd_m2_s3=0.02, prior="start")
     assert len(set(map(id, fitted.noise.values()))) == 3

@@ -44,6 +44,7 @@ def test_an_ekf_that_is_linear_has_the_error_it_says():
     assert abs(found - exact.mean()) < SIGMAS * error
 
 
+@pytest.mark.slow
 def test_particles_reach_the_bound_of_the_regular_model():
     """Tracks drawn from the model; the linear filter, whose error is known exactly, takes most of the noise away."""
     regular = model(toa())

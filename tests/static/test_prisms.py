@@ -14,7 +14,7 @@ STATIONS = [[0, 15, 8.0], [-13, -7.5, 2], [13, -7.5, 3.0], [4, 4, 9]]
     "base",
     [
         lb.UniformBox([-10, -8], [10, 8]),
-        lb.UniformPolygon([[-10, -8], [10, -8], [10, 8], [-10, 8]]),
+        pytest.param(lb.UniformPolygon([[-10, -8], [10, -8], [10, 8], [-10, 8]]), marks=pytest.mark.slow),
     ],
 )
 def test_bounds_of_a_prism_are_those_of_the_box(base):

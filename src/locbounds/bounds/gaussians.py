@@ -44,7 +44,7 @@ class Gaussians(Expectation):
     The Gaussians of a filter that is told the sight, for the first of two tracks:
 
     >>> import numpy as np, locbounds as lb
-    >>> scenario = lb.papers.fritsche2013.scenario(steps=5).with_known_sight(np.zeros(5, int))
+    >>> scenario = lb.papers.fritsche2013.scenario(steps=3).with_known_sight(np.zeros(3, int))
     >>> draws = lb.simulate(scenario, runs=2)
     >>> found = lb.OracleEkf()(scenario, draws.measurements, sight=draws.sight)
     >>> of_filter = Gaussians(found.mean[0], found.covariance[0], label="one EKF run")

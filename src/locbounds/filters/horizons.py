@@ -56,7 +56,7 @@ class Predicted(_OfFilter):
     Examples
     --------
     >>> import locbounds as lb
-    >>> scenario = lb.papers.fritsche2013.scenario(steps=6)
+    >>> scenario = lb.papers.fritsche2013.scenario(steps=3)
     >>> ahead = Predicted(lb.ImmEkf(), 2)
     >>> ahead.name, sorted(ahead.sees)
     ('IMM-EKF, 2 steps ahead', ['ranges-2-steps-old'])
@@ -138,13 +138,13 @@ class Smoothed(_OfFilter):
     No filtering bound speaks of it, as it uses later ranges:
 
     >>> import locbounds as lb
-    >>> scenario = lb.papers.fritsche2013.scenario(steps=6)
+    >>> scenario = lb.papers.fritsche2013.scenario(steps=3)
     >>> smoother = Smoothed(lb.ImmEkf())
     >>> smoother.name, sorted(smoother.sees)
     ('IMM-EKF, smoothing', ['future-ranges', 'ranges'])
     >>> draws = lb.simulate(scenario, runs=8)
     >>> smoother(scenario, draws.measurements).mean.shape
-    (8, 7, 4)
+    (8, 4, 4)
     """
 
     filter: Any

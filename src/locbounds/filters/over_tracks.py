@@ -1,9 +1,7 @@
 """Run a kernel over any number of tracks, in chunks that fit the cache, on all cores."""
 
 import functools
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import jax
@@ -11,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from locbounds.axes import Array
+from locbounds.cores import on_all_cores
 from locbounds.precision import traced
 
 # XLA's CPU compiler drops optimisation barriers before it fuses; without that pass they hold, here three times as fast.
@@ -65,9 +64,8 @@ def over_tracks(
     model = jax.tree.map(jnp.asarray, model)
 
     def compute(begin: int) -> tuple[np.ndarray | None, ...]:
-        with jax.enable_x64(True):  # the scope is per thread
-            parts = run(model, *(_chunk(d, begin, size) for d in data), **static)
-            return tuple(None if part is None else np.moveaxis(np.asarray(part), -1, 0) for part in parts)
+        parts = run(model, *(_chunk(d, begin, size) for d in data), **static)
+        return tuple(None if part is None else np.moveaxis(np.asarray(part), -1, 0) for part in parts)
 
     def store(begin: int, parts: tuple[np.ndarray | None, ...]) -> None:
         for result, part in zip(results, parts, strict=True):
@@ -81,17 +79,8 @@ def over_tracks(
         if result is not None:
             result[:, 0] = row
     store(0, parts)
-    rest = range(size, runs, size)
-    workers = min(_cores(), len(rest))
-    if workers:
-        with ThreadPoolExecutor(workers) as pool:
-            list(pool.map(lambda begin: store(begin, compute(begin)), rest))
+    on_all_cores(lambda begin: store(begin, compute(begin)), range(size, runs, size))
     return tuple(results)
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _with_first(row: Array, later: Array) -> Array:

@@ -12,7 +12,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from locbounds.axes import Array, Float, ndarray
 from locbounds.errors import RefusedError
@@ -138,6 +137,8 @@ class LogCoefficient:
         kept = np.isfinite(values)
         x, values = x[kept], values[kept]
         self.high = float(np.exp(x[-1]))
+        from scipy.interpolate import CubicSpline
+
         self.table = CubicSpline(x, np.log(-values) - 2 * x)
         self.slope = float(self.table(x[0], 1))
 

@@ -1,5 +1,5 @@
-"""The papers: one file each, with their scenarios, published numbers, tables and figures."""
+"""The papers: one file or folder each, with their scenarios, published numbers, tables and figures."""
 
-from locbounds.papers import chen2010, fritsche2013, mcguire2009, prieto2011
+import lazy_loader
 
-__all__ = ["chen2010", "fritsche2013", "mcguire2009", "prieto2011"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

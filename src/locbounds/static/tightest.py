@@ -74,7 +74,7 @@ def tightest(
     EZZB is the tightest: 2.215 m, 4.4 % above WWB (2.121 m); BCRB does not apply: the density of a uniform law ...
     >>> [lb.tightest(lb.toa([[0, 15], [-13, -7.5], [13, -7.5]], std, prior=plan.prior)).best.id for std in (2.0, 12.0)]
     ['ezzb', 'wwb']
-    >>> scenario = lb.papers.fritsche2013.scenario(stay=0.6, steps=10)
+    >>> scenario = lb.papers.fritsche2013.scenario(stay=0.6, steps=3)
     >>> [b.id for b in lb.tightest([lb.bcrb(scenario), lb.enumer(scenario), lb.los_only(scenario)])]
     ['bcrb']
     """
