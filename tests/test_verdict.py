@@ -342,7 +342,7 @@ def test_every_assumption_has_a_model_that_violates_it_and_a_verdict_that_says_s
     verdict = method("bcrb").verdict(bad)
     assert verdict.status is status
     assert any(words in reason for reason in verdict.reasons)
-    assert words in lb.explain("bcrb", bad)
+    assert f"{'violated' if status is Status.REFUSED else 'trusted '} {assumption.text}: " in lb.explain("bcrb", bad)
     if status is Status.REFUSED:
         with pytest.raises(lb.RefusedError, match=re.escape(words)):
             lb.bcrb(bad)

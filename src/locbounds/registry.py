@@ -493,6 +493,14 @@ def _cite(keys: list[str]) -> list[str]:
     return [f"cite     {key}: {CITATIONS[key]}" for key in keys]
 
 
+def _checked(assumption: Assumption, subject: Any) -> str:
+    why = assumption.violated(subject)
+    if why is not None:
+        return f"violated {assumption.text}: {why}"
+    trusted = assumption.trusted(subject)
+    return f"holds    {assumption.text}" if trusted is None else f"trusted  {assumption.text}: {trusted}"
+
+
 def explain(id: str, scenario: "Scenario | Plan | JumpMarkov | None" = None) -> str:
     """What a bound or filter assumes, when it misleads, and whom to cite; made from the table of methods.
 
@@ -530,7 +538,6 @@ def explain(id: str, scenario: "Scenario | Plan | JumpMarkov | None" = None) -> 
     lines += [f"careful  {entry['fails']}", *_cite(entry["cite"])]
     if scenario is not None:
         lines += ["", f"for      {scenario.title or f'this {_kind(scenario)}'}"]
-        checks = method(id).check(scenario)
-        lines += [f"violated {text}: {why}" if why else f"holds    {text}" for text, why in checks]
+        lines += [_checked(a, scenario) for a in method(id).assumed(scenario)]
         lines += [f"verdict  {method(id).verdict(scenario)}"]
     return "\n".join(lines)

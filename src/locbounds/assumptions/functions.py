@@ -120,7 +120,7 @@ def _at_a_pole(subject: Scenario | JumpMarkov) -> str | None:
         part = np.arange(2) if p.vertical else np.arange(len(p.place))
         v = f.view[part]
         for mean, covariance in laws:
-            for k in range(len(mean)) if f.reports is None else np.flatnonzero(f.reports):
+            for k in looked_at(f.reports, len(mean)) - 1:
                 if meets(mean[k][v], covariance[k][np.ix_(v, v)], p.place[part]) in (1, 2):
                     where = "on the vertical through it" if p.vertical and len(p.place) > 2 else "at the anchor"
                     return (
