@@ -12,7 +12,7 @@ import numpy as np
 
 from locbounds.axes import Array, Bool, Float
 from locbounds.errors import InputError
-from locbounds.measurement import BySight, Measurement
+from locbounds.measurement import Anchored, BySight
 from locbounds.motion import Motion, SwitchingMotion
 from locbounds.noise import Noise
 from locbounds.precision import traced
@@ -55,7 +55,7 @@ class Link(eqx.Module):
     """
 
     name: str = eqx.field(static=True)
-    measurement: Measurement | BySight
+    measurement: Anchored | BySight
     sight: Sight
     noises: tuple[Noise, ...]
     reports: Bool[Array, " steps"] | None = None

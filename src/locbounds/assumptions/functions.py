@@ -163,7 +163,8 @@ def _search(f: _Function, x: ndarray, k: ndarray, surely_positive: bool) -> Find
     modes = [r for r in range(f.modes) if not any(np.array_equal(first[r], first[q]) for q in range(r))]
     jump = infinite = nearly = None
     periodic = any(getattr(m, "periodic", False) for m in f.made_of)
-    anchors = [np.asarray(m.anchor) for m in f.made_of if np.shape(getattr(m, "anchor", None)) == x.shape[-1:]]
+    anchors = [np.asarray(m.anchor) for m in f.made_of if hasattr(m, "anchor")]
+    anchors = [a for a in anchors if a.shape == x.shape[-1:]]
     for r in modes:
 
         def values(points: ndarray, r: int = r) -> ndarray:

@@ -4,7 +4,7 @@ import equinox as eqx
 
 from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError, RefusedError
-from locbounds.measurement.base import Measurement
+from locbounds.measurement.nature import Anchored
 
 
 class BySight(eqx.Module):
@@ -31,7 +31,7 @@ class BySight(eqx.Module):
     [8.0, 12.0]
     """
 
-    measurements: tuple[Measurement, ...] = eqx.field(converter=tuple)
+    measurements: tuple[Anchored, ...] = eqx.field(converter=tuple)
 
     def __check_init__(self):
         if len({m.dim for m in self.measurements}) != 1:
@@ -40,9 +40,9 @@ class BySight(eqx.Module):
     @property
     def anchor(self) -> Float[Array, " space"]:
         """Position of the anchor: that of the first sight condition."""
-        return self.measurements[0].anchor  # pyright: ignore[reportAttributeAccessIssue]
+        return self.measurements[0].anchor
 
-    def under(self, mode: int) -> Measurement:
+    def under(self, mode: int) -> Anchored:
         """The measurement under one sight condition."""
         return self.measurements[mode]
 

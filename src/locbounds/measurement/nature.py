@@ -10,6 +10,7 @@ from locbounds.measurement.path_loss import PathLoss
 from locbounds.measurement.range import Range
 from locbounds.measurement.range_difference import RangeDifference
 
+Anchored = Range | RangeDifference | Bearing | Elevation | PathLoss  # what has an anchor, and may be a link
 KNOWN = (Range, RangeDifference, Bearing, Elevation, PathLoss)
 
 

@@ -15,7 +15,7 @@ SMALL = 1e-6  # increments below this share of the values are rounding
 
 
 def segments(
-    one: Float[Array, "segments space"], other: Float[Array, "segments space"]
+    one: Float[ndarray, "segments space"], other: Float[ndarray, "segments space"]
 ) -> tuple[Float[ndarray, "segments space"], Float[ndarray, "segments space"]]:
     """Both ends of segments through pairs of draws, somewhat longer than what lies between them.
 
@@ -28,8 +28,8 @@ def segments(
 
 def find_jump(
     values: Callable[[Float[ndarray, "segments points space"]], Float[Array, "segments points"]],
-    low: Float[Array, "segments space"],
-    high: Float[Array, "segments space"],
+    low: Float[ndarray, "segments space"],
+    high: Float[ndarray, "segments space"],
     *,
     inside: Callable[[Float[ndarray, "n space"]], Bool[Array, " n"]] | None = None,
     periodic: bool = False,
