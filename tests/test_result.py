@@ -104,12 +104,18 @@ def test_efficiency_is_a_ratio_of_mean_square_errors_with_an_interval():
         ({"track": "a walk"}, {}, "random tracks"),
         ({}, {"verdict": Verdict(Status.REFUSED, ("no",))}, "refused"),
         ({}, {"time_s": np.array([0.0, 0.5, 1.1])}, "time steps"),
+        ({"scenario": "one"}, {"scenario": "another"}, "another scenario"),
     ],
 )
 def test_pairs_that_do_not_match_are_refused(estimator, bound, match):
     estimate = result(id="f", **{"kind": "filter"} | estimator)
     with pytest.raises(lb.RefusedError, match=match):
         estimate.efficiency(result(**bound))
+
+
+def test_a_result_without_a_scenario_is_compared_as_before():
+    for mine, theirs in (("", "one"), ("one", ""), ("one", "one")):
+        assert filter_result(scenario=mine).efficiency(result(scenario=theirs)).value < 1
 
 
 def test_a_bound_that_assumes_more_knowledge_bounds_both_kinds_of_filters():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import locbounds as lb
+from locbounds.evaluation import evaluate_on
 from locbounds.result import Efficiency
 from locbounds.scoring import verdict
 from scenarios import STEPS, asymmetric
@@ -37,6 +38,27 @@ def test_a_score_is_what_evaluate_says_of_the_same_runs(scenario, bound, draws, 
     np.testing.assert_allclose(mine.result.position_mse, theirs.position_mse, rtol=1e-12)
     np.testing.assert_allclose(mine.result.diagnostics["nees"], theirs.diagnostics["nees"], rtol=1e-9)
     assert str(mine.efficiency) == str(theirs.efficiency(bound))
+
+
+def test_numbers_of_different_scenarios_are_not_compared(scenario, bound, draws, imm):
+    theirs = lb.evaluate(lb.ImmEkf(), scenario, runs=RUNS, seed=4)
+    links = [lb.Link(f"x{m}", a.measurement, a.sight, a.noises, a.reports) for m, a in enumerate(scenario.links)]
+    again = scenario.replace(title="the same", links=links, times=lb.Times(np.array(scenario.times.time_s)))
+    assert lb.bcrb(again, samples=1).scenario == bound.scenario == theirs.scenario != ""
+    assert bound.to_dataset().attrs["scenario"] == bound.scenario
+    always_nlos = scenario.with_known_sight(np.ones(STEPS, int))
+    oracle = lb.evaluate(lb.OracleEkf(), scenario, runs=RUNS, seed=4)
+    with pytest.raises(lb.RefusedError, match="another scenario"):
+        oracle.efficiency(lb.known_sight(always_nlos, samples=1))
+    told = lb.evaluate(lb.OracleEkf(), always_nlos, runs=RUNS, seed=4)
+    told.efficiency(lb.known_sight(always_nlos, samples=1))
+    draws_of_nlos = lb.simulate(always_nlos, runs=RUNS, seed=4)
+    evaluate_on(lb.OracleEkf(), scenario, draws_of_nlos).efficiency(lb.known_sight(always_nlos, samples=1))
+    other = scenario.replace(links=[a.replace(sight=lb.MarkovSight.stay(0.2)) for a in scenario.links])
+    with pytest.raises(lb.RefusedError, match="another scenario"):
+        theirs.efficiency(lb.bcrb(other, samples=1))
+    with pytest.raises(lb.RefusedError, match="another scenario"):
+        lb.score(imm.mean, draws, bound, scenario=other)
 
 
 def test_efficiency_by_hand(bound, draws, imm):

@@ -76,7 +76,7 @@ def evaluate(
     if runs < 2 or int(runs) != runs:
         raise InputError(f"the number of runs is {runs}", "Give a whole number of at least 2")
     draws = simulate(scenario, runs=runs, seed=seed)
-    return evaluate_on(filter, scenario, draws, seed=seed, name=name, progress=progress)
+    return evaluate_on(filter, scenario, draws, seed=seed, name=name, progress=progress, truth=scenario)
 
 
 def evaluate_on(
@@ -87,8 +87,13 @@ def evaluate_on(
     seed: int = 0,
     name: str | None = None,
     progress: Callable[[int, int], None] | None = None,
+    truth: Scenario | None = None,
 ) -> Result:
-    """As :func:`evaluate`, on tracks that were drawn before: several filters then see the same ones."""
+    """As :func:`evaluate`, on tracks that were drawn before: several filters then see the same ones.
+
+    ``scenario`` is what the filter assumes, ``truth`` what the tracks were drawn from: if given, the result can only be
+    compared with bounds of that.
+    """
     runs, n = len(draws.states), scenario.motion.state_size
     errors, nees = [], []
     diagnostics: dict[str, list[Any]] = {}
@@ -119,6 +124,7 @@ def evaluate_on(
         name=name,
         seed=seed,
         how="tracks drawn from the model",
+        truth=truth,
         diagnostics={key: np.concatenate(parts) for key, parts in diagnostics.items()},
     )
 
@@ -188,8 +194,12 @@ def result_of_errors(
     how: str,
     warnings: tuple[str, ...] = (),
     diagnostics: dict[str, Any] | None = None,
+    truth: Scenario | None = None,
 ) -> Result:
-    """The result of a filter from its position errors; ``filter`` lends its id, name and what it sees."""
+    """The result of a filter from its position errors; ``filter`` lends its id, name and what it sees.
+
+    ``truth`` is the scenario that the tracks were drawn from, if that is known.
+    """
     runs = len(error)
     groups = min(GROUPS, runs)
     square = error**2
@@ -214,6 +224,7 @@ def result_of_errors(
         verdict=Verdict(Status.VALID, (), warnings),
         provenance=Provenance.now(seed, runs, how, METHODS[id].references if id in METHODS else ()),
         diagnostics=diagnostics,
+        scenario="" if truth is None else truth.fingerprint(),
     )
 
 

@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from locbounds.measurement import Bearing, PathLoss
+from locbounds.measurement import pole
 from locbounds.plan import Plan
-from locbounds.plan.jumps import black_box_jump
+from locbounds.plan.jumps import black_box_jump, black_box_steepness
+from locbounds.probes import Steep, once
 from locbounds.verdict import REGULAR_PLAN, Assumption
 
 
@@ -37,6 +38,7 @@ def discontinuous(plan: Plan) -> str | None:
     return jumping_function(plan)
 
 
+@once
 def jumping_function(plan: Plan) -> str | None:
     """Which function jumps, and where, or None."""
     jump = black_box_jump(plan)
@@ -66,15 +68,46 @@ def diverging_information(plan: Plan) -> str | None:
     if plan.prior is None:
         return None
     for m, name in _measurements(plan):
-        steep = isinstance(m, Bearing) or (isinstance(m, PathLoss) and m.near_field_m is None and plan.dim < 3)
-        if steep and _comes_to(plan.prior, np.asarray(m.anchor), vertical=isinstance(m, Bearing)):
-            what = "angle" if isinstance(m, Bearing) else "strength"
+        steep = pole(m)
+        if steep is None or (plan.dim > 2 and not steep.vertical):
+            continue
+        if _comes_to(plan.prior, steep.place, vertical=steep.vertical):
             return (
-                f"the {what} of {name} changes like 1/r near the anchor, where the prior's density is positive: its "
-                "expected information is infinite, the bound zero, and a Monte Carlo value drifts with the draws"
-                + ("" if isinstance(m, Bearing) else " (a near-field radius, near_field_m, makes it finite)")
+                f"the {steep.what} of {name} changes like 1/r near the anchor, where the prior's density is positive: "
+                "its expected information is infinite, the bound zero, and a Monte Carlo value drifts with the draws"
+                + (" (a near-field radius, near_field_m, makes it finite)" if steep.what == "strength" else "")
             )
-    return None
+    infinite, why = steep_function(plan)
+    return why if infinite else None
+
+
+def perhaps_diverging(plan: Plan) -> str | None:
+    """What has to be taken on trust of a function that is very steep somewhere, or None."""
+    infinite, why = steep_function(plan)
+    return None if infinite else why
+
+
+@once
+def steep_function(plan: Plan) -> tuple[bool, str | None]:
+    """Whether the expected information of a function is infinite, and why it is or may be."""
+    found = black_box_steepness(plan)
+    if found is None:
+        return False, None
+    channel, steep = found
+    return bool(steep.infinite), steep_words(f"the function of channel {plan.channel_names[channel]}", steep)
+
+
+def steep_words(what: str, steep: Steep) -> str:
+    """What a steep place means, in one sentence.
+
+    >>> steep_words("h", Steep(np.zeros(1), 0.4, 1, None))
+    'h continuous, E|grad h|^2 finite: the slope of h grows like r^-0.40 towards (0), too close to infinite to tell'
+    """
+    place = ", ".join(f"{x:.4g}" for x in np.round(steep.place, 9) + 0.0)
+    grows = f"the slope of {what} grows like r^-{steep.exponent:.2f} towards ({place})"
+    if steep.infinite:
+        return f"{grows}, where the density is positive: its expected information is infinite, the bound zero"
+    return f"h continuous, E|grad h|^2 finite: {grows}, too close to infinite to tell"
 
 
 def _measurements(plan: Plan) -> list[tuple[Any, str]]:
@@ -100,5 +133,5 @@ ONE_UNIT = Assumption("all measurements have the same unit", mixed_units)
 REGULAR_PRIOR = Assumption("the prior's density vanishes smoothly where it ends", irregular_prior)
 CONTINUOUS = Assumption("every measurement is continuous over the places that the prior allows", discontinuous)
 RESOLVED = Assumption("no function jumps: integrals over short test vectors miss it", unresolved_jump)
-FINITE_EXPECTATION = Assumption("the expected information is finite", diverging_information)
+FINITE_EXPECTATION = Assumption("the expected information is finite", diverging_information, trusted=perhaps_diverging)
 BAYESIAN_PLAN = (WITH_PRIOR, REGULAR_PRIOR, REGULAR_PLAN, CONTINUOUS, FINITE_EXPECTATION)

@@ -85,7 +85,12 @@ def reference(
     while True:
         say(f"{particles:,} particles")
         result = evaluate_on(
-            Rbpf(particles, covariance=False), scenario, draws, seed=(seed + len(counts)) % 2**32, name="reference"
+            Rbpf(particles, covariance=False),
+            scenario,
+            draws,
+            seed=(seed + len(counts)) % 2**32,
+            name="reference",
+            truth=scenario,
         )
         square = np.square(np.asarray(result.diagnostics["error_m"])[:, 1:]).mean(axis=1)
         change, error = (np.nan, np.inf) if before is None else _relative_change(before, square)

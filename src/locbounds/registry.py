@@ -6,9 +6,10 @@ Docs tables, ``locbounds explain``, verdicts and the command line's choices are 
 import importlib
 from typing import Any, NamedTuple
 
-from locbounds.assumptions import COMMON, LINEAR_CHANNELS, LINEAR_MOTION
+from locbounds.assumptions import COMMON, LINEAR_CHANNELS, LINEAR_MOTION, MODEL
 from locbounds.citations import CITATIONS
 from locbounds.errors import InputError
+from locbounds.model import JumpMarkov
 from locbounds.plan import Plan
 from locbounds.plan_assumptions import BAYESIAN_PLAN, ONE_UNIT, RESOLVED, WITH_PRIOR
 from locbounds.scenario import Scenario
@@ -60,6 +61,8 @@ class Method(NamedTuple):
         What it speaks of: a ``"scenario"``, a ``"survey"``, a ``"plan"`` or a ``"model"`` built in Python.
     on_plan
         Predicates on a plan, for a bound of scenarios that exists for plans too.
+    on_model
+        Predicates on a general model, for a bound of scenarios that exists for these too.
     """
 
     id: str
@@ -75,9 +78,10 @@ class Method(NamedTuple):
     conditions: tuple[str, ...] = ()
     subject: str = "scenario"
     on_plan: tuple[Assumption, ...] = ()
+    on_model: tuple[Assumption, ...] = ()
 
     def verdict(self, subject: Any, conditions: tuple[str, ...] = ()) -> Verdict:
-        """Whether it applies to a scenario (or to a survey model, or to a plan)."""
+        """Whether it applies to a scenario (or to a survey, a plan, or a general model)."""
         grounds = ON_PLAN if self.on_plan and isinstance(subject, Plan) else self.grounds
         return judge(self.assumed(subject), subject, grounds=grounds, conditions=self.conditions + conditions)
 
@@ -87,7 +91,9 @@ class Method(NamedTuple):
 
     def assumed(self, subject: Any) -> tuple[Assumption, ...]:
         """The assumptions that concern a subject."""
-        return self.on_plan if self.on_plan and isinstance(subject, Plan) else self.assumptions
+        if self.on_plan and isinstance(subject, Plan):
+            return self.on_plan
+        return self.on_model if self.on_model and isinstance(subject, JumpMarkov) else self.assumptions
 
 
 ON_PLAN = ("regular prior", "smooth noise")
@@ -111,6 +117,7 @@ METHODS: dict[str, Method] = {
             ("fritsche2013", "louis1982"),
             (*COMMON, SMOOTH_NOISE),
             on_plan=BAYESIAN_PLAN,
+            on_model=MODEL,
         ),
         Method(
             "enumer",
@@ -450,13 +457,15 @@ def check_subject(entry: Method, subject: Any) -> None:
     locbounds.errors.InputError: crlb speaks of a plan, not of a scenario. Give a plan file ...
     """
     given = _kind(subject)
-    if given in (None, entry.subject) or (given == "plan" and entry.on_plan):
+    too = {"plan": entry.on_plan, "model": entry.on_model}
+    if given in (None, entry.subject) or too.get(given):
         return
     raise InputError(f"{entry.id} speaks of a {entry.subject}, not of a {given}", REMEDIES[entry.subject])
 
 
 def _kind(subject: Any) -> str | None:
-    return "plan" if isinstance(subject, Plan) else "scenario" if isinstance(subject, Scenario) else None
+    kinds = {"plan": Plan, "scenario": Scenario, "model": JumpMarkov}
+    return next((kind for kind, of in kinds.items() if isinstance(subject, of)), None)
 
 
 def describe(entry: Method) -> dict[str, Any]:
@@ -473,6 +482,7 @@ def describe(entry: Method) -> dict[str, Any]:
         "sees": sorted(entry.sees),
         "assumes": [*entry.conditions, *entry.grounds, *(a.text for a in entry.assumptions)],
         "on_plan": [a.text for a in entry.on_plan],
+        "on_model": [a.text for a in entry.on_model if a.text not in {b.text for b in entry.assumptions}],
         "fails": entry.fails,
         "cite": list(entry.references),
         "references": [CITATIONS[key] for key in entry.references],
@@ -483,7 +493,15 @@ def _cite(keys: list[str]) -> list[str]:
     return [f"cite     {key}: {CITATIONS[key]}" for key in keys]
 
 
-def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
+def _checked(assumption: Assumption, subject: Any) -> str:
+    why = assumption.violated(subject)
+    if why is not None:
+        return f"violated {assumption.text}: {why}"
+    trusted = assumption.trusted(subject)
+    return f"holds    {assumption.text}" if trusted is None else f"trusted  {assumption.text}: {trusted}"
+
+
+def explain(id: str, scenario: "Scenario | Plan | JumpMarkov | None" = None) -> str:
     """What a bound or filter assumes, when it misleads, and whom to cite; made from the table of methods.
 
     Parameters
@@ -491,7 +509,8 @@ def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
     id
         Id of a method, for example ``bcrb``, or the topic ``regularity``.
     scenario
-        If given, every assumption is checked for it, and the verdict added; a plan for methods that speak of plans.
+        If given, every assumption is checked for it, and the verdict added; a plan or a general model for methods that
+        speak of these.
 
     Raises
     ------
@@ -515,10 +534,10 @@ def explain(id: str, scenario: "Scenario | Plan | None" = None) -> str:
     lines = [f"{entry['name']} ({entry['id']}), {article} {entry['kind']}", entry["summary"], ""]
     lines += [f"sees     {', '.join(entry['sees'])}", *(f"assumes  {text}" for text in entry["assumes"])]
     lines += [f"assumes  of a plan (one position): {text}" for text in entry["on_plan"]]
+    lines += [f"assumes  of a general model: {text}" for text in entry["on_model"]]
     lines += [f"careful  {entry['fails']}", *_cite(entry["cite"])]
     if scenario is not None:
         lines += ["", f"for      {scenario.title or f'this {_kind(scenario)}'}"]
-        checks = method(id).check(scenario)
-        lines += [f"violated {text}: {why}" if why else f"holds    {text}" for text, why in checks]
+        lines += [_checked(a, scenario) for a in method(id).assumed(scenario)]
         lines += [f"verdict  {method(id).verdict(scenario)}"]
     return "\n".join(lines)

@@ -79,6 +79,9 @@ class Result(eqx.Module):
         Whether the number may be quoted; where it comes from.
     track
         Label of the one track that the number is conditional on, or an empty string.
+    scenario
+        Fingerprint of the scenario that the number belongs to (of a filter: that its tracks were drawn from), or an
+        empty string where that is not known: results of plans, of general models, or made by hand.
     diagnostics
         Further arrays by name, each explained in the docs of its producer.
 
@@ -101,6 +104,7 @@ class Result(eqx.Module):
     verdict: Verdict = eqx.field(static=True)
     provenance: Provenance = eqx.field(static=True)
     track: str = eqx.field(static=True, default="")
+    scenario: str = eqx.field(static=True, default="")
     diagnostics: dict[str, Any] = eqx.field(default_factory=dict)
 
     def _label(self, values: Array, name: str, units: str = "m") -> "xarray.DataArray":
@@ -147,7 +151,7 @@ class Result(eqx.Module):
         ------
         RefusedError
             If the bound does not bound this filter: it assumes less than the filter sees, belongs to one track, was
-            refused, or stands on other time steps.
+            refused, stands on other time steps, or belongs to another scenario.
         """
         if bound.kind != "bound" or self.kind == "bound":
             raise RefusedError(
@@ -181,6 +185,12 @@ class Result(eqx.Module):
             raise RefusedError(f"{bound.name} {said}: {bound.verdict}", "Choose a bound that applies")
         if not np.array_equal(self.time_s, bound.time_s):
             raise RefusedError("the time steps of filter and bound differ", "Compute both on one scenario")
+        if self.scenario and bound.scenario and self.scenario != bound.scenario:
+            raise RefusedError(
+                f"{self.name} was run on tracks of another scenario than {bound.name} speaks of: numbers, noises, "
+                "chains or a known sight schedule differ",
+                "Compute both on one scenario (evaluate on what the bound is of)",
+            )
         log_ratio = float(np.log(np.mean(bound.position_mse) / np.mean(self.position_mse)))
         spreads = [
             float(standard_error(np.asarray(r.replicates).mean(axis=1))) / float(np.mean(r.position_mse))
@@ -209,6 +219,7 @@ class Result(eqx.Module):
             "sees": ", ".join(sorted(self.sees)),
             "verdict": str(self.verdict),
             "track": self.track,
+            "scenario": self.scenario,
             "seed": p.seed,
             "samples": p.samples,
             "how": p.how,

@@ -137,6 +137,7 @@ def score(
         seed=0,
         how="estimates made elsewhere",
         warnings=_blind(error, true_place, scenario),
+        truth=scenario,
     )
     efficiency = result.efficiency(bound)
     return Score(result, bound, efficiency, verdict(result, bound, efficiency))

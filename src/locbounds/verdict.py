@@ -35,11 +35,14 @@ class Assumption(NamedTuple):
         Predicate: the reason why a scenario (or a survey) violates it, or None.
     doubtful
         Predicate: the reason why it cannot be decided whether it is violated, or None.
+    trusted
+        Predicate: what only the user can know and has to vouch for, a condition of the verdict, or None.
     """
 
     text: str
     violated: Callable[[Any], str | None]
     doubtful: Callable[[Any], str | None] = lambda subject: None
+    trusted: Callable[[Any], str | None] = lambda subject: None
 
 
 class Verdict(NamedTuple):
@@ -72,7 +75,8 @@ def judge(
     Parameters
     ----------
     assumptions
-        Checked in turn; a violation refuses, a doubt leaves the verdict undecided.
+        Checked in turn; a violation refuses, a doubt leaves the verdict undecided, what is trusted makes it
+        conditional.
     grounds
         Why the bound holds when nothing is violated.
     conditions
@@ -82,6 +86,7 @@ def judge(
     if violations:
         return Verdict(Status.REFUSED, violations)
     warnings = dangers(subject) if isinstance(subject, Scenario) else getattr(subject, "dangers", tuple)()
+    conditions += tuple(trust for a in assumptions if (trust := a.trusted(subject)) is not None)
     doubts = tuple(doubt for a in assumptions if (doubt := a.doubtful(subject)) is not None)
     if doubts:
         return Verdict(Status.UNDECIDED, doubts + conditions, warnings)

@@ -8,6 +8,7 @@ import pytest
 
 import locbounds as lb
 from locbounds.bounds.all_lags import corrected_bound
+from locbounds.result import tightest
 from scenarios import STEPS, Linear, asymmetric, kalman, mask, prior
 
 ROUNDING = 1e-7  # relative; exact identities up to the ridge of 1e-10 and its square root
@@ -113,6 +114,10 @@ def test_a_plain_window_goes_wrong_by_percents_and_the_corrected_value_does_not(
     difference, error = apart(bound, full)
     assert difference < SIGMAS * error
     assert difference > -0.05 * abs(wrong) - SIGMAS * error
+    assert full.verdict.status.value == bound.verdict.status.value == "valid"
+    assert plain.verdict.status.value == "valid under"
+    assert "window of 1 of 24 steps" in str(plain.verdict)
+    assert not any(chosen is plain for chosen in tightest([plain, full]))
     reported = abs(plain.position_rmse.values / full.position_rmse.values - 1).max()
     assert bound.diagnostics["truncation"] == pytest.approx(reported, rel=0.2)
 

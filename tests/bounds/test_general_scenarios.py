@@ -138,6 +138,8 @@ def test_the_window_grows_with_the_precision_and_reports_what_it_cut(plain):
     assert cut > 1e-3
     assert full.diagnostics["truncation"] == 0
     assert np.isnan(short.diagnostics["truncation"])
+    assert "window of 4 of 24 steps" in str(short.verdict)
+    assert full.verdict.status.value == "valid"
     automatic = lb.bcrb(scenario, rtol=0.05)
     left = np.abs(np.sqrt(automatic.position_mse / full.position_mse) - 1).max()
     assert automatic.diagnostics["truncation"] <= 5e-3

@@ -345,6 +345,12 @@ def test_the_bound_is_below_the_minimum_mean_square_error_and_not_far(noises, de
           "channels": lb.AdditiveChannel(lambda x, mode, k: x[0], SIGHTS)}, "the motion has modes"),
         ({"channels": lb.AdditiveChannel(lambda x, mode, k: jnp.abs(x[0]), [lb.Gaussian(0, 1)])}, "not linear"),
         ({"channels": lb.AdditiveChannel(lambda x, mode, k: x[0] + mode, SIGHTS), "chains": STICKY}, "the mode"),
+        ({"channels": lb.AdditiveChannel(lambda x, mode, k: 3 * jnp.sign(x[0]), [lb.Gaussian(0, 0.5)]),
+          "prior": lb.GaussianPrior([0.3], [[4.0]])}, "not linear"),
+        ({"channels": lb.AdditiveChannel(lambda x, mode, k: jnp.round(x[0]), [lb.Uniform(-0.1, 0.1)])}, "not linear"),
+        ({"channels": lb.AdditiveChannel(lambda x, mode, k: x[0] + jnp.sign(x[0]), [lb.Gaussian(0, 1)])}, "not linear"),
+        ({"channels": lb.AdditiveChannel(lambda x, mode, k: jnp.sign(x[0] - 60.0), [lb.Gaussian(0, 1)]),
+          "motion": lb.LinearMotion(ONE, 2000.0 * ONE, position_index=(0,))}, "not linear"),
     ],
 )  # fmt: skip
 def test_other_models_are_refused_with_the_reason(changes, words):

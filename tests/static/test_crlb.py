@@ -1,5 +1,6 @@
 """The Cramér-Rao bound of plans: against finite differences, textbook formulas, and what may not change it."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -168,6 +169,16 @@ def test_singular_places_are_marked_with_the_reason():
     u, v = np.array([1, -1, -1]), 1e-5 / np.array([7, 3, 9])  # unit vectors along x and y, to first order
     assert found.covariance[3, 1, 1] == pytest.approx(1 / (v @ v - (u @ v) ** 2 / 3), rel=1e-6)
     assert "singular at 2" in str(found)
+
+
+def test_a_derivative_that_is_not_finite_is_not_called_singular_geometry():
+    def angle(p):
+        return jnp.arctan(jnp.sqrt(p[0] ** 2 + p[1] ** 2))  # its derivative at the origin is 0/0
+
+    own = lb.toa([[-5.0, 1.0], [5.0, 2.0]], 1.0) + lb.observe(angle, 0.1)
+    found = lb.crlb(own, np.array([[0.0, 0.0], [2.0, 3.0]]))
+    assert found.status.tolist() == [2, 0]
+    assert "derivative is not finite" in found.reasons[0]
 
 
 def test_differences_behind_the_line_of_two_anchors_are_singular_not_huge():

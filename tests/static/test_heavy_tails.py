@@ -61,3 +61,14 @@ def test_tables_agree_with_quadrature_between_their_nodes(name):
     rho, p = (double_precision(lambda f=f: np.asarray(f(noise, d)))() for f in (lb.bhattacharyya, lb.minimum_error))
     np.testing.assert_allclose(1 - made.rho(d), 1 - rho, rtol=1e-4)
     np.testing.assert_allclose(made.p_min(d), p, rtol=1e-4, atol=1e-7)
+
+
+def test_beyond_its_reach_a_table_of_errors_is_not_too_large():
+    """The Ziv-Zakai integral grows with it. For two Cauchy laws d apart it is 1/2 - arctan(d / 2) / pi."""
+    made = double_precision(lambda: table(lb.StudentT(1.0, 0.0, 1.0), False))()
+    d = np.geomspace(1.0, 1e9, 60)
+    exact = np.arctan2(2.0, d) / np.pi
+    assert np.all(made.p_min(d) <= exact * (1 + 1e-3))
+    assert np.any(made.p_min(d) == 0)
+    angle = double_precision(lambda: table(lb.StudentT(5.0, 0.0, 0.5), True))()
+    assert np.all(angle.p_min(np.array([-np.pi, np.pi])) > 0)

@@ -14,18 +14,20 @@ from locbounds.bounds.bcrb_of_plan import bcrb_of_plan
 from locbounds.bounds.common import bound_result, further_information, prepare
 from locbounds.bounds.corrected import corrected
 from locbounds.bounds.expectation import Expectation
-from locbounds.bounds.general import general, model_verdict
+from locbounds.bounds.general import general
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
 from locbounds.bounds.score_covariance import NoiseProcess, noise_process, score_covariance_increments
 from locbounds.bounds.separated import SeparatedIncrements, geometry
-from locbounds.bounds.truncation import extrapolated, shortened
+from locbounds.bounds.truncation import extrapolated, judged, shortened
 from locbounds.errors import InputError, RefusedError
 from locbounds.horizon import Horizon
 from locbounds.model import JumpMarkov, jump_markov
 from locbounds.plan import Plan
 from locbounds.precision import double_precision, traced
+from locbounds.registry import method
 from locbounds.result import Result
 from locbounds.scenario import Scenario, beyond_separation
+from locbounds.sight import KnownSight
 from locbounds.verdict import Status
 
 PATHS = 64  # noise paths per group and block
@@ -137,14 +139,16 @@ def bcrb(
         that sees what the horizon says. ``diagnostics["truncation"]`` is the relative error of the position RMSE, at
         the worst step, made by truncating at the window, as extrapolated from how the bound changes when the window is
         shortened by a quarter and by a half. It exceeds the error where the entries left out decay quickly; it is no
-        guarantee, and the error may have either sign. NaN where the window was given. From the corrected engine it is
+        guarantee, and the error may have either sign. NaN where the window was given and is shorter than the record:
+        the verdict is then conditional on it. From the corrected engine it is
         the distance between the truncated and the corrected value, and ``diagnostics["remainder"]``, its square, the
         order of what the corrected value, which lies below the bound up to its standard error, still lacks.
 
     Raises
     ------
     RefusedError
-        If an assumption is violated (see ``locbounds explain bcrb``), or the engine has no such horizon.
+        If an assumption is violated (see ``locbounds explain bcrb``; functions of one's own are searched for jumps and
+        for slopes without a finite mean square), or the engine has no such horizon.
     InputError
         If an option makes no sense, or the horizon lies beyond the record.
 
@@ -209,7 +213,7 @@ def _by_general_engine(scenario, rtol, samples, seed, expectation, window, progr
             "Transform a scenario with links of their own chains and a motion without modes",
         )
     if isinstance(scenario, JumpMarkov):
-        verdict, model, why = model_verdict(scenario), scenario, "the model is a JumpMarkov"
+        verdict, model, why = method("bcrb").verdict(scenario), scenario, "the model is a JumpMarkov"
         if verdict.status is Status.REFUSED:
             raise RefusedError(f"bcrb does not apply: {'; '.join(verdict.reasons)}", "See: locbounds explain bcrb")
     else:
@@ -297,8 +301,9 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress, 
 
         tables = draw(0)
         solution = _solve(scenario, *tables, extra, horizon=horizon)
-        truncation = 0.0 if size == scenario.steps or id == "known-sight" else np.nan  # known sight: nothing to cut
-        if window is None and size < scenario.steps and not differentiable:
+        known = all(isinstance(link.sight, KnownSight) for link in scenario.links)  # then there is nothing to cut
+        truncation = 0.0 if size == scenario.steps or known else np.nan
+        if window is None and size < scenario.steps and not differentiable and not known:
             truncation = extrapolated(solution.shorter, solution.estimate.position_mse, size, scenario.steps)
             if truncation > rtol_target / 10:
                 size = min(2 * size, scenario.steps)
@@ -316,4 +321,5 @@ def separated(id, scenario, rtol, samples, seed, expectation, window, progress, 
     how = f"noise and geometry separated, Louis' identity, window of {size} steps"
     diagnostics = {"truncation": np.float64(truncation), "window": np.int64(size)}
     used = done * groups * PATHS
+    verdict = judged(verdict, truncation, size, scenario.steps)
     return bound_result(id, scenario, estimate, verdict, expectation, seed, used, how, diagnostics, horizon)

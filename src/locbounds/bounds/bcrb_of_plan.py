@@ -30,7 +30,7 @@ def bayesian_information(plan: Plan, *, rtol: float = RTOL) -> tuple[Float[ndarr
         n = n + n // 2
         finer = _information(plan, prior, n)
         change = float(np.abs(finer - J).max() / np.abs(np.diagonal(finer)).max())
-        if change <= rtol or n > MOST:
+        if change <= rtol or n > MOST or not np.all(np.isfinite(finer)):
             return finer, change
         J = finer
 
@@ -67,8 +67,15 @@ def bcrb_of_plan(plan: Plan, *, rtol: float = 1e-3) -> Result:
             "The Ziv-Zakai bound (ezzb) exists for every prior and measurement, Weiss-Weinstein (wwb) unless one jumps",
         )
     J, change = bayesian_information(plan, rtol=min(rtol, RTOL))
-    if change > rtol:
-        verdict = verdict._replace(warnings=(*verdict.warnings, f"the quadrature changed by {change:.1%} at last"))
+    if not np.all(np.isfinite(J)):
+        raise RefusedError(
+            "the expected information is not a number: a measurement has no derivative where the prior is positive",
+            "Make its function differentiable there (the root of zero and 0/0 are not); ezzb needs no derivative",
+        )
+    if not change <= rtol:
+        doubt = f"the expected information may be infinite: more nodes changed it by {change:.1%}"
+        reasons = verdict.reasons if verdict.status is not Status.VALID else ()
+        verdict = verdict._replace(status=Status.UNDECIDED, reasons=(doubt, *reasons))
     matrix = np.linalg.inv(J)
     return Result(
         id="bcrb",

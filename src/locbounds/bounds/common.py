@@ -86,5 +86,6 @@ def bound_result(
         verdict=verdict,
         provenance=Provenance.now(seed, samples, how, entry.references),
         track=expectation.label,
+        scenario=scenario.fingerprint() if isinstance(scenario, Scenario) else "",
         diagnostics=diagnostics,
     )

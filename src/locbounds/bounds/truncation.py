@@ -3,6 +3,7 @@
 import numpy as np
 
 from locbounds.axes import Array, Bool, Float
+from locbounds.verdict import Status, Verdict
 
 
 def shortened(window: int) -> list[Bool[Array, " window"]]:
@@ -41,3 +42,22 @@ def extrapolated(
     quarter, half = (float(change.max()) for change in relative)
     beyond = quarter / (half - 2 * quarter) if half > 2 * quarter else np.inf  # q / (1 - q)
     return quarter * (1.0 + min(beyond, 4 * (steps - window) / window))
+
+
+def judged(verdict: Verdict, truncation: float, window: int, steps: int) -> Verdict:
+    """The verdict, under the condition that a given window is long enough where nobody has looked what it leaves out.
+
+    Information that is left out has either sign: the number may lie above the bound.
+
+    >>> judged(Verdict(Status.VALID, ("smooth noise",)), float("nan"), 2, 9).status.value
+    'valid under'
+    """
+    if np.isfinite(truncation) or window >= steps:
+        return verdict
+    condition = (
+        f"a window of {window} of {steps} steps leaves nothing out that matters: its truncation is not known, and the "
+        "number may lie above the bound (leave the window out and it is chosen)"
+    )
+    if verdict.status is Status.VALID:
+        return verdict._replace(status=Status.CONDITIONAL, reasons=(condition,))
+    return verdict._replace(reasons=(*verdict.reasons, condition))

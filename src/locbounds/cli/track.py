@@ -149,7 +149,7 @@ def _on_model(model, bounds, filters, rtol, runs, seed, folder, json, wanted, ho
                 draws = simulate(model, runs=runs, seed=seed)
         for filter in filters:
             with count_progress(filter.name) as progress:
-                results.append(evaluate_on(filter, model, draws, seed=seed, progress=progress))
+                results.append(evaluate_on(filter, model, draws, seed=seed, progress=progress, truth=model))
     except KeyboardInterrupt:
         folder.partial = True
         _save(results, model, folder)

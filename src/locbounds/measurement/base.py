@@ -41,6 +41,10 @@ class Measurement(eqx.Module):
     dim: ClassVar[Any] = None
     """Number of coordinates of a position; None: any."""
 
+    def under(self, mode: int) -> "Measurement":
+        """The measurement under one sight condition: itself."""
+        return self
+
     @abstractmethod
     def __call__(self, position: Float[Array, " space"]) -> Any:
         """The value at one position [space]."""

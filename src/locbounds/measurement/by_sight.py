@@ -4,7 +4,7 @@ import equinox as eqx
 
 from locbounds.axes import Array, Float, Scalar
 from locbounds.errors import InputError, RefusedError
-from locbounds.measurement.range import Range
+from locbounds.measurement.nature import Anchored
 
 
 class BySight(eqx.Module):
@@ -25,15 +25,16 @@ class BySight(eqx.Module):
     A wall at x = 10 reflects the signal of the anchor at the origin:
 
     >>> import numpy as np
+    >>> from locbounds.measurement import Range
     >>> reflected = BySight([Range([0.0, 0.0]), Range([20.0, 0.0])])
     >>> [float(reflected.under(r)(np.array([8.0, 0.0]))) for r in (0, 1)]
     [8.0, 12.0]
     """
 
-    measurements: tuple[Range, ...] = eqx.field(converter=tuple)
+    measurements: tuple[Anchored, ...] = eqx.field(converter=tuple)
 
     def __check_init__(self):
-        if len({len(m.anchor) for m in self.measurements}) != 1:
+        if len({m.dim for m in self.measurements}) != 1:
             raise InputError("the measurements have different numbers of coordinates", "Give one per sight condition")
 
     @property
@@ -41,7 +42,7 @@ class BySight(eqx.Module):
         """Position of the anchor: that of the first sight condition."""
         return self.measurements[0].anchor
 
-    def under(self, mode: int) -> Range:
+    def under(self, mode: int) -> Anchored:
         """The measurement under one sight condition."""
         return self.measurements[mode]
 

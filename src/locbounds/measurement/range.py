@@ -41,10 +41,6 @@ class Range(Measurement):
     def __check_init__(self):
         check_anchor(self.anchor)
 
-    def under(self, mode: int) -> "Range":
-        """The measurement under one sight condition: itself."""
-        return self
-
     @property
     def dim(self) -> int:
         return len(self.anchor)

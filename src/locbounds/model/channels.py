@@ -80,7 +80,8 @@ class AdditiveChannel(Channel):
     Parameters
     ----------
     h
-        ``h(x, mode, k)``, one number; differentiable by JAX with respect to x.
+        ``h(x, mode, k)``, one number; differentiable by JAX with respect to x. The BCRB needs it continuous, with
+        ``E|grad h|^2`` finite, and looks for violations.
     noises
         One noise per mode.
     chain

@@ -3,7 +3,7 @@
 import equinox as eqx
 
 from locbounds.axes import Array, Float, Scalar
-from locbounds.measurement import BySight, Range
+from locbounds.measurement import BySight, Measurement
 from locbounds.model.channels import AdditiveChannel
 from locbounds.model.jump_markov import JumpMarkov
 from locbounds.motion import SwitchingMotion
@@ -14,7 +14,7 @@ from locbounds.sight import Sight
 class LinkFunction(eqx.Module):
     """A link's measurement as a function of position, mode and step."""
 
-    measurement: Range | BySight
+    measurement: Measurement | BySight
 
     def __call__(self, x: Float[Array, " space"], mode: int, k: Array) -> Scalar:
         return self.measurement.under(mode)(x)

@@ -15,7 +15,8 @@ from locbounds.priors import DensityPrior
 
 SINGULAR = 1e-12  # smallest eigenvalue of a correlation matrix that is not called singular
 LINEAR = 1e-9  # relative change of a gradient from place to place that counts as rounding
-PLACES = 5
+PLACES = 24
+FAR = (1.0, 3.0)  # deviations of the state that places spread over
 
 
 @double_precision
@@ -58,10 +59,13 @@ def no_linear_channel(model: JumpMarkov) -> str | None:
     for c, channel in enumerate(model.channels):
         if not isinstance(channel, AdditiveChannel):
             return f"channel {c} is no h(x) plus noise"
-        values, slopes = _at_places(model, c)
+        values, slopes, places = _at_places(model, c)
         steep = max(np.abs(slopes).max(), np.finfo(float).tiny)
-        if np.abs(slopes - slopes[:1, :1]).max() > LINEAR * steep:
+        if not np.abs(slopes - slopes[:1, :1]).max() <= LINEAR * steep:
             return f"h of channel {c} is not linear in the state"
+        predicted = values[:, :1] + np.einsum("rkv,pv->rpk", slopes[:, 0], places - places[0])
+        if not np.abs(values - predicted).max() <= LINEAR * (1 + np.abs(values).max()):
+            return f"h of channel {c} is not linear in the state: its values differ by other than slope times way"
         if np.abs(values - values[:1]).max() > LINEAR * (1 + np.abs(values).max()):
             return f"h of channel {c} depends on the mode"
     return None
@@ -82,13 +86,21 @@ def _view(model: JumpMarkov, channel: Any) -> ndarray:
 
 
 @double_precision
-def _at_places(model: JumpMarkov, c: int) -> tuple[ndarray, ndarray]:
-    """Values [modes, places, steps] and gradients [modes, places, steps, view] of a channel's h."""
+def _at_places(model: JumpMarkov, c: int) -> tuple[ndarray, ndarray, ndarray]:
+    """Values [modes, places, steps], gradients [modes, places, steps, view] and places [places, view] of a channel.
+
+    The places spread over all that the state comes to.
+    """
     channel: Any = model.channels[c]
     prior: Any = model.prior
-    rng = np.random.default_rng(0)
-    spread = np.sqrt(np.diag(np.asarray(prior.covariance)))
-    places = np.asarray(prior.mean) + (1 + spread) * rng.normal(size=(PLACES, model.state_size))
+    F, Q, P = matrices(model)
+    mean = start = np.asarray(prior.mean)
+    spread = np.sqrt(np.diag(P))
+    for F_k, Q_k in zip(F, Q, strict=True):
+        mean, P = F_k @ mean, F_k @ P @ F_k.T + Q_k
+        spread = np.maximum(spread, np.abs(mean - start) + np.sqrt(np.diag(P)))
+    draws = np.random.default_rng(0).normal(size=(PLACES, model.state_size)) * np.resize(FAR, PLACES)[:, None]
+    places = (start + (1 + spread) * draws)[:, _view(model, channel)]
     k = jnp.arange(1, model.steps + 1)
     values, slopes = [], []
     for mode in range(len(channel.noises)):
@@ -97,7 +109,7 @@ def _at_places(model: JumpMarkov, c: int) -> tuple[ndarray, ndarray]:
             return jnp.reshape(channel.h(x, mode, k), ())
 
         both = jax.vmap(jax.vmap(jax.value_and_grad(h), (None, 0)), (0, None))
-        value, slope = both(jnp.asarray(places[:, _view(model, channel)]), k)
+        value, slope = both(jnp.asarray(places), k)
         values.append(np.asarray(value))
         slopes.append(np.asarray(slope))
-    return np.stack(values), np.stack(slopes)
+    return np.stack(values), np.stack(slopes), places

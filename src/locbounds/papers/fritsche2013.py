@@ -135,7 +135,7 @@ def study(
         results = []
         for filter in (ImmKf(covariance=False), ImmEkf(covariance=False)):
             say(f"stay {stay}: {filter.name}")
-            results.append(evaluate_on(filter, model, draws, seed=seed, progress=go_on))
+            results.append(evaluate_on(filter, model, draws, seed=seed, progress=go_on, truth=model))
         return results
 
     def bounds(stay: float) -> list[Result]:

@@ -22,6 +22,7 @@ SHIFTS = 513  # nodes of a table
 CORE = 1e-3  # deviations up to which they are equally spaced
 MOST = 1e5  # deviations of the longest shift
 NEGLIGIBLE = 1e-15
+BEYOND = 1e-9  # relative: shifts closer than this to the reach of a table are within it
 
 
 class Table(NamedTuple):
@@ -50,8 +51,13 @@ class Table(NamedTuple):
         return self.look_up(self.coefficient, d)
 
     def p_min(self, d: Float[Array, "*n"]) -> Float[Array, "*n"]:
-        """Minimum error probability of two equally probable values."""
-        return self.look_up(self.error, d)
+        """Minimum error probability of two equally probable values; zero beyond the reach, which is never too large.
+
+        The Ziv-Zakai integral grows with it, so that the last value, too large further out, would not be safe.
+        """
+        xp = jnp if traced(d) else np
+        reach = self.unit * np.sinh(self.rate * (len(self.error[0]) - 1))
+        return xp.where(xp.abs(d) > (1 + BEYOND) * reach, 0.0, self.look_up(self.error, d))
 
 
 def table(noise: Noise, periodic: bool) -> Table:

@@ -133,6 +133,11 @@ class StreetRanges(Measurement):
         return self.difference_to is None
 
     @property
+    def continuous(self) -> bool:
+        """Whether no path jumps where the line of sight is lost."""
+        return not np.any(self.nlos_bias_m)
+
+    @property
     def places(self) -> Float[Array, "anchors 2"]:
         """Positions of the anchors."""
         return self.anchors.place + self.origin

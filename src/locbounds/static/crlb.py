@@ -35,7 +35,7 @@ MANY = 16  # channels from which a common part of their noise is worth a look
 REASONS = {
     0: "",
     1: "the measurements do not determine the position here",
-    2: "no derivative here: at an anchor, or where an angle is not defined",
+    2: "no derivative here: at an anchor, where an angle is not defined, or the function's derivative is not finite",
 }
 
 
@@ -343,7 +343,7 @@ def _block(parts: list, counts: tuple[int, ...], order: Any, root: Any, floor: A
         for part, n in zip(parts, counts, strict=True)
     ]
     at_anchor = _fold(jnp.minimum, jnp.concatenate(near)) <= AT_ANCHOR_M
-    status = jnp.where(at_anchor, 2, jnp.where(ok, 0, 1)).astype(jnp.int8)
+    status = jnp.where(at_anchor | ~jnp.isfinite(size), 2, jnp.where(ok, 0, 1)).astype(jnp.int8)
     good = status == 0
     columns = [
         jnp.where(good, C[min(i, j)][max(i, j)], jnp.inf if i == j else 0.0)

@@ -17,7 +17,7 @@ from locbounds.bounds.general.increments import information_increments
 from locbounds.bounds.general.parts import Part
 from locbounds.bounds.precision_control import Estimate, Progress, check_rtol, refine
 from locbounds.bounds.recursion import GivenIncrements, LinearModel
-from locbounds.bounds.truncation import extrapolated, shortened
+from locbounds.bounds.truncation import extrapolated, judged, shortened
 from locbounds.errors import InputError, RefusedError
 from locbounds.horizon import FILTER, PREDICT, Horizon
 from locbounds.model import AdditiveChannel, DensityMotion, JumpMarkov
@@ -172,7 +172,7 @@ def general(
         "largest_mean_score": np.float64(strange),
     }
     how = f"general engine, because {why}; Fisher's and Louis' identities, window of {size} steps"
-    verdict = _judged(verdict, model, strange)
+    verdict = judged(_judged(verdict, model, strange), truncation, size, model.steps)
     used = done * groups * PATHS
     return bound_result(id, model, estimate, verdict, expectation, seed, used, how, diagnostics, horizon)
 

@@ -96,6 +96,7 @@ def wwb_recursive(
     >>> wwb_recursive(model).position_rmse.values.round(2)
     array([2.  , 0.43, 0.32, 0.31, 0.3 ])
     """
+    scenario = model.fingerprint() if isinstance(model, Scenario) else ""
     model = jump_markov(model) if isinstance(model, Scenario) else model
     horizon = Horizon.parse(horizon, model.steps)
     _check(moved, sizes, scale)
@@ -140,6 +141,7 @@ def wwb_recursive(
         verdict=verdict,
         provenance=Provenance.now(0, 0, f"test functions move {moved}", entry.references),
         diagnostics={"scale": best},
+        scenario=scenario,
     )
 
 
