@@ -10,7 +10,7 @@ from scenarios import STEPS, asymmetric, mask, one_link, prior, sequence_probabi
 
 SIGMAS = 4.0  # one statistic per scenario: the time-averaged RMSE
 SAMPLES = 8192
-PRECISION = 6e-3  # largest relative standard error of the comparison: a wrong edge or lag shows
+PRECISION = 6e-3  # largest relative standard error of the comparison; single edges and lags: test_separated_draws.py
 
 OUTLIERS = lb.GaussianMixture([0.8, 0.2], [0.0, 4.0], [2.0, 6.0])
 
