@@ -2,6 +2,7 @@
 
 import math
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.special import erf, ndtr
@@ -125,6 +126,15 @@ def test_a_given_information_is_checked_and_named_in_the_verdict():
     for wrong, words in ((J[:-1], "shape"), (np.append(J, 1.0), "shape"), (-J, "negative"), (J * np.nan, "not finite")):
         with pytest.raises(lb.InputError, match=words):
             distance_bcrb(model(sensor), given=wrong)
+
+
+def test_noise_that_cannot_be_decided_leaves_the_bound_undecided():
+    creeping = lb.FromLogDensity(
+        lambda w: jnp.log(w) + jnp.log(1 - jnp.log(w)) + 2 * jnp.log1p(-w), support=(0.0, 1.0), normalise=True
+    )
+    found = distance_bcrb(model(toa(noise=creeping, bias=None)))
+    assert found.verdict.status is Status.UNDECIDED
+    assert found.verdict.reasons[0].startswith("TimeOfArrival: ")
 
 
 def log_density(e):

@@ -138,7 +138,12 @@ def distance_bcrb(
         )
         if said
     ]
-    verdict = Verdict(Status.CONDITIONAL, tuple(conditions)) if conditions else Verdict(Status.VALID, entry.grounds)
+    regularities = [] if given is not None else [(type(s).__name__, s.error.regularity()) for s in model.sensors]
+    doubts = [f"{name}: {regularity.reason}" for name, regularity in regularities if regularity.finite is None]
+    if doubts:
+        verdict = Verdict(Status.UNDECIDED, (*doubts, *conditions))
+    else:
+        verdict = Verdict(Status.CONDITIONAL, tuple(conditions)) if conditions else Verdict(Status.VALID, entry.grounds)
     return _result(entry.id, entry.name + horizon.label, model, P, verdict, horizon, track, "quadrature")
 
 
