@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import locbounds as lb
 from locbounds.cli.app import app
+from locbounds.io.city_file import load_city
 from locbounds.propagation import City, LinkTable
 from locbounds.static.street_map import cell_bounds, street_crlb, street_map
 from locbounds.static.street_raster import raster_ezzb, raster_mmse, raster_wwb, street_raster
@@ -268,6 +269,22 @@ def test_bad_city_files(files, old, new, cause, remedy):
         map_city(files / "city.toml", files / "out")
     assert cause in caught.value.cause
     assert remedy in caught.value.remedy
+
+
+def test_anchors_of_a_city_from_a_table_named_below_a_section(files):
+    (files / "anchors.csv").write_text("anchor_id,x_m,y_m,z_m\na,-5,-5,9\nb,40,-5,9\nc,40,40,9\nd,15,15,9\n")
+    head = TEXT[: TEXT.index("[anchors]")]
+    (files / "table.toml").write_text(head + 'anchors_csv = "anchors.csv"\n[anchors]\nd = { roof = true }\n')
+    found = load_city(files / "table.toml")
+    assert found.anchors == {"a": (-5, -5), "b": (40, -5), "c": (40, 40), "d": (15, 15)}
+    assert found.roof == ("d",)
+    for line, words in (
+        ("e = { roof = true }", "anchor e has no position"),
+        ("e = { position_m = [1, 2, 3] }", "3 numbers"),
+    ):
+        (files / "table.toml").write_text(head + f"[anchors]\n{line}\n")
+        with pytest.raises(lb.InputError, match=words):
+            load_city(files / "table.toml")
 
 
 def test_a_cell_that_no_anchor_reaches_is_left_out():
