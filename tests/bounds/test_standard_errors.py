@@ -1,50 +1,100 @@
-"""Reported standard errors against the spread over seeds."""
+"""Reported standard errors against the spread over seeds: many seeds of a tiny scenario, one compiled shape each."""
+
+from functools import partial
 
 import numpy as np
 import pytest
 from scipy import stats
 
 import locbounds as lb
-from scenarios import STEPS, asymmetric, mask
+from scenarios import asymmetric
 
-SEEDS = 40
-FALSE_ALARM = 2e-4  # two-sided, for each of four methods: below 1e-3 together
+SEEDS = 480
+GROUPS = 32
+BLOCK = 2048  # noise paths
+STEPS = 3
+FALSE_ALARM = 1e-4  # two-sided, for each comparison: below 1e-3 together
+SEEN = 1.15  # an error that is wrong by this factor is outside, whatever the method
 ROUNDING = 1e-9
+
+REPORTS = np.array([[1, 1], [1, 0], [1, 1]], bool)
 
 
 @pytest.fixture(scope="module")
 def scenario():
-    return asymmetric(reports=mask(STEPS, 2))
+    return asymmetric(steps=STEPS, reports=REPORTS)
 
 
-@pytest.mark.parametrize(
-    "bound",
-    [
-        lambda s, seed: lb.bcrb(s, samples=1, window=STEPS, seed=seed),
-        lambda s, seed: lb.enumer(s, samples=1, seed=seed),
-        lambda s, seed: lb.los_only(s, samples=1, seed=seed),
-        lambda s, seed: lb.bcrb_algorithm1(s, samples=1, seed=seed),
-    ],
-    ids=["bcrb", "enumer", "los-only", "algorithm 1"],
-)
-def test_spread_over_seeds_is_the_standard_error(scenario, bound):
-    results = [bound(scenario, seed) for seed in range(SEEDS)]
-    values = np.array([r.mean_position_rmse() for r in results])
-    errors = np.array([r.mean_position_rmse_stderr() for r in results])
-    # each error has 31 degrees of freedom itself: an F law
-    ratio = values.var(ddof=1) / np.mean(errors**2)
-    law = stats.f(SEEDS - 1, SEEDS * 31)
-    assert law.ppf(FALSE_ALARM / 2) < ratio < law.ppf(1 - FALSE_ALARM / 2)
-    for r in results[:3]:
-        assert r.replicates.shape == (32, STEPS + 1)
-        spread = np.abs(r.replicates).max()
-        assert np.abs(r.replicates.mean(0)).max() < 0.02 * spread  # deviations from the mean, up to second order
-        assert np.all(r.replicates[:, 0] == 0)
-        assert r.mean_position_rmse_stderr() <= r.position_rmse_stderr.values.mean() * (1 + ROUNDING)
+def errors(results):
+    return np.array([float(r.mean_position_rmse_stderr()) for r in results])
 
 
-def test_sixteen_times_the_samples_quarter_the_error(scenario):
-    few, many = lb.bcrb(scenario, samples=2048, window=STEPS), lb.bcrb(scenario, samples=32768, window=STEPS)
-    ratio = few.mean_position_rmse_stderr() / many.mean_position_rmse_stderr()
-    # ratio of two deviations with 31 degrees of freedom each, whose truth is 4
-    assert stats.f(31, 31).cdf((ratio / 4) ** 2) == pytest.approx(0.5, abs=0.4999)
+def limits(of_spread, of_errors):
+    """Of the ratio of two deviations that estimate the same, by their degrees of freedom."""
+    law = stats.f(of_spread, of_errors)
+    low, high = np.sqrt(law.ppf([FALSE_ALARM / 2, 1 - FALSE_ALARM / 2]))
+    assert 1 / SEEN < low < high < SEEN
+    return low, high
+
+
+def calibrated(results, groups=GROUPS):
+    values = np.array([float(r.mean_position_rmse()) for r in results])
+    assert len(set(values)) == len(results)
+    ratio = values.std(ddof=1) / np.sqrt(np.mean(errors(results) ** 2))
+    low, high = limits(SEEDS - 1, SEEDS * (groups - 1))
+    assert low < ratio < high
+
+
+BOUNDS = {  # functions of the seed; the model is the same one for all, so that nothing is compiled anew
+    "bcrb": lambda s: partial(lb.bcrb, s, samples=1, window=STEPS),
+    "enumer": lambda s: partial(lb.enumer, s, samples=1),
+    "los-only": lambda s: partial(lb.los_only, s, samples=1),
+    "algorithm 1": lambda s: partial(lb.bcrb_algorithm1, s, samples=1),
+    "corrected": lambda s: partial(lb.bcrb, s, samples=1, window=2, engine="corrected"),
+    "predict": lambda s: partial(lb.bcrb, s, samples=1, window=STEPS, horizon="predict:1"),
+    "smooth": lambda s: partial(lb.bcrb, s, samples=1, window=STEPS, horizon="smooth"),
+    "general": lambda s: partial(lb.bcrb, lb.jump_markov(s), samples=1, window=STEPS),
+}
+
+
+def results(method, scenario):
+    bound = BOUNDS[method](scenario)
+    return [bound(seed=seed) for seed in range(SEEDS)]
+
+
+@pytest.fixture(scope="module")
+def many(scenario):
+    return results("bcrb", scenario)
+
+
+def test_spread_over_seeds_is_the_standard_error(many):
+    calibrated(many)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", list(BOUNDS)[1:])
+def test_spread_over_seeds_is_the_standard_error_of_every_bound(scenario, method):
+    calibrated(results(method, scenario))
+
+
+@pytest.mark.parametrize("method", [*list(BOUNDS)[:3], pytest.param("algorithm 1", marks=pytest.mark.slow)])
+def test_replicates_are_deviations_from_the_mean(scenario, method):
+    r = BOUNDS[method](scenario)(seed=0)
+    assert r.replicates.shape == (GROUPS, STEPS + 1)
+    assert np.abs(r.replicates.mean(0)).max() < 0.02 * np.abs(r.replicates).max()  # up to second order
+    assert np.all(r.replicates[:, 0] == 0)
+    assert r.mean_position_rmse_stderr() <= r.position_rmse_stderr.values.mean() * (1 + ROUNDING)
+
+
+def test_sixteen_times_the_samples_quarter_the_error(scenario, many):
+    """Mean squares of the errors of many seeds, so that one that falls by three or by five is outside."""
+    more = [lb.bcrb(scenario, samples=16 * BLOCK, window=STEPS, seed=seed) for seed in range(SEEDS, SEEDS + 25)]
+    ratio = np.sqrt(np.mean(errors(many) ** 2) / np.mean(errors(more) ** 2)) / 4
+    low, high = limits(SEEDS * (GROUPS - 1), len(more) * (GROUPS - 1))
+    assert low < ratio < high
+
+
+@pytest.mark.slow
+def test_spread_over_seeds_is_the_standard_error_of_the_least_error():
+    plan = lb.toa([[-10.0, 0.0], [10.0, 3.0]], 2.0, prior=lb.UniformDisc([0.0, 0.0], 6.0))
+    calibrated([lb.mmse(plan, draws=256, seed=seed) for seed in range(SEEDS)], groups=16)
