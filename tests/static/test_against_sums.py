@@ -14,6 +14,7 @@ from locbounds.static.weiss_weinstein_kernel import bound_matrices, grams, with_
 from locbounds.static.ziv_zakai_kernel import along
 
 GRID = 5e-3  # of sums over cells: their edge is a staircase
+COARSE = 2e-2  # of those over few cells
 ANCHORS = np.array([[0.0, 5.0], [-4.3, -2.5], [4.3, -2.5]])
 L_SHAPE = shapely.Polygon([(0, 0), (9, 0), (9, 3), (3, 3), (3, 9), (0, 9)])
 H = np.diag([1.6, 1.6])  # whole cells
@@ -53,6 +54,54 @@ def test_both_bounds_on_an_area(area, std):
     slow = by_hand.ziv_zakai(points, inside, error, a, 14.0, cells=150)
     quick = along(support, law, a, 12, [1.0], rtol=1e-3).mse_m2[0]
     assert quick == pytest.approx(slow, rel=4 * GRID)
+
+
+SMALL = 3.0  # radius of a disc that no anchor is in
+
+
+def in_small_disc(p):
+    return np.sum(p**2, axis=1) < SMALL**2
+
+
+def differences(std):
+    """Times without their mean: the same knowledge as all differences."""
+    times = ranges(std)
+    return lambda p: times(p) - times(p).mean(1, keepdims=True)
+
+
+def strengths(std):
+    metres = ranges(1.0)
+    return lambda p: 30 * np.log10(metres(p)) / std
+
+
+def bearings(p):
+    gap = p[:, None] - ANCHORS
+    return np.arctan2(gap[..., 1], gap[..., 0])
+
+
+KINDS = {
+    "ToA": (lb.toa, 2.0, by_hand.gaussian(ranges(2.0))),
+    "TDoA": (lb.tdoa, 2.0, by_hand.gaussian(differences(2.0))),
+    "RSS": (lb.rss, 6.0, by_hand.gaussian(strengths(6.0))),
+    "AoA": (lb.aoa, 0.6, by_hand.wrapped(bearings, 0.6)),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_both_bounds_of_every_kind_of_measurement(kind):
+    """Root mean square errors within two per cent of sums over few cells; the bounds' own grid is another."""
+    make, std, (affinity, error) = KINDS[kind]
+    plan = make(ANCHORS, std, prior=lb.UniformDisc([0.0, 0.0], SMALL))
+    (level,) = lb.bounds_over_noise(plan, [1.0], printed=False, rtol=2e-3)
+    points = by_hand.grid(in_small_disc, [-SMALL] * 2, [SMALL] * 2, 0.05)
+    slow = by_hand.weiss_weinstein(points, 0.05, in_small_disc, affinity, level.length_m * np.eye(2))
+    assert level.wwb_m == pytest.approx(np.sqrt(np.trace(slow)), rel=COARSE)
+    points = by_hand.grid(in_small_disc, [-SMALL] * 2, [SMALL] * 2, 0.15)
+    slow = sum(by_hand.ziv_zakai(points, in_small_disc, error, a, 2 * SMALL, cells=40) for a in np.eye(2))
+    assert level.ezzb_m == pytest.approx(np.sqrt(slow), rel=COARSE)
+    nothing = SMALL / np.sqrt(2)  # the prior's own error
+    assert 0.3 * nothing < level.wwb_m < nothing
+    assert 0.3 * nothing < level.ezzb_m < nothing
 
 
 def test_an_area_that_is_not_convex_is_not_treated_as_if_it_were():
