@@ -1,5 +1,6 @@
 """The README: its example runs and prints what it says, its table and commands are those of the program."""
 
+import math
 import re
 import shlex
 
@@ -9,23 +10,35 @@ from datasets import PROJECT
 from locbounds.registry import METHODS
 
 README = (PROJECT / "README.md").read_text()
-NUMBER = re.compile(r"(?<!\+- )\b\d+\.\d+")
-ERROR = re.compile(r"(?<=\+- )\d+\.\d+")
-OTHER_DRAWS = 0.05  # relative: a README need not be edited whenever the order of the draws changes
+NUMBER = re.compile(r"\d+\.\d+")
+WITH_ERROR = re.compile(r"(\d+\.\d+) \+- (\d+\.\d+)")
+WITH_INTERVAL = re.compile(r"(\d+\.\d+) \[(\d+\.\d+), (\d+\.\d+)\]")  # 95 %
+SIGMAS = 5.0  # a README need not be edited whenever the order of the draws changes
 
 
 def block(language):
     return re.search(rf"^```{language}\n(.*?)^```", README, re.S | re.M)[1]  # type: ignore[index]
 
 
+def estimates(text):
+    """Every number that stands with its uncertainty, and its standard error."""
+    pairs = [(float(value), float(error)) for value, error in WITH_ERROR.findall(text)]
+    return pairs + [(float(x), (float(high) - float(low)) / 3.92) for x, low, high in WITH_INTERVAL.findall(text)]
+
+
 def test_the_example_prints_what_the_readme_says(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(compile(block("python"), "README.md", "exec"), {})
     printed, said = capsys.readouterr().out, block("text")
-    assert ERROR.sub("#", NUMBER.sub("#", printed)) == ERROR.sub("#", NUMBER.sub("#", said))
-    for kind, relative in ((NUMBER, OTHER_DRAWS), (ERROR, 0.5)):
-        values, promised = ([float(x) for x in kind.findall(text)] for text in (printed, said))
-        assert values == pytest.approx(promised, rel=relative)
+    assert NUMBER.sub("#", printed) == NUMBER.sub("#", said)
+    values, promised = estimates(printed), estimates(said)
+    assert len(values) == 3
+    for (value, error), (other, its_error) in zip(values, promised, strict=True):
+        assert abs(value - other) <= SIGMAS * math.hypot(error, its_error)
+        assert error == pytest.approx(its_error, rel=0.5)
+    (bound, _), (filter, _), (efficiency, _) = values
+    assert bound < filter
+    assert efficiency < 1
     assert (tmp_path / "tracking.png").stat().st_size > 10_000
 
 
