@@ -1,8 +1,8 @@
 """Where the measured data sets are: the one setting that tests, benchmarks and pages share.
 
 The environment variable ``LOCBOUNDS_DATA`` names the folder that holds them (``wifi_rtt_walks/`` and others);
-without it ``../shared/data`` beside the project is taken. They are not part of the project: what needs one that is
-missing is skipped.
+without it ``../shared/data`` beside the project is taken. They are not part of the project: without the setting, what
+needs one that is missing is skipped. Who sets it promises that all are there: then a missing one is a failure.
 """
 
 import os
@@ -23,10 +23,13 @@ def find(name: str) -> Path | None:
 
 
 def need(name: str) -> Path:
-    """The folder of one data set; skips the running test where it is missing."""
+    """The folder of one data set; where it is missing the running test fails if the setting is made, else it skips."""
     import pytest
 
     path = find(name)
     if path is None:
-        pytest.skip(f"data set {name} is not in {folder()}; set LOCBOUNDS_DATA to the folder that has it")
+        missing = f"data set {name} is not in {folder()}"
+        if os.environ.get("LOCBOUNDS_DATA"):
+            pytest.fail(f"{missing}, which LOCBOUNDS_DATA names; put it there or unset LOCBOUNDS_DATA", pytrace=False)
+        pytest.skip(f"{missing}; set LOCBOUNDS_DATA to the folder that has it")
     return path

@@ -67,11 +67,17 @@ def test_shape_annotations_are_checked_in_the_tests():
     assert any(type(finder).__module__.startswith("jaxtyping") for finder in sys.meta_path)
 
 
-def test_missing_data_is_a_skip_with_a_remedy(tmp_path, monkeypatch):
+def test_missing_data_is_a_failure_where_the_setting_promises_them(tmp_path, monkeypatch):
     monkeypatch.setenv("LOCBOUNDS_DATA", str(tmp_path))
     (tmp_path / "here").mkdir()
     assert datasets.need("here") == tmp_path / "here"
-    with pytest.raises(pytest.skip.Exception, match="LOCBOUNDS_DATA"):
+    with pytest.raises(pytest.fail.Exception, match=r"absent.*LOCBOUNDS_DATA"):
+        datasets.need("absent")
+
+
+def test_missing_data_is_a_skip_with_a_remedy_without_the_setting(monkeypatch):
+    monkeypatch.delenv("LOCBOUNDS_DATA", raising=False)
+    with pytest.raises(pytest.skip.Exception, match="set LOCBOUNDS_DATA"):
         datasets.need("absent")
 
 
