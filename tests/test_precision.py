@@ -128,11 +128,11 @@ def test_gradient_with_respect_to_mixture_weights_is_that_of_the_expectation():
 
 def test_a_plain_call_inside_a_users_jit_is_a_constant():
     scenario = one_link()
-    plain = lb.bcrb(scenario, rtol=5e-3).mean_position_rmse()
+    plain = lb.bcrb(scenario, rtol=2e-2).mean_position_rmse()
 
     @jax.jit
     def double(x):
-        return x * lb.bcrb(scenario, rtol=5e-3).mean_position_rmse()
+        return x * lb.bcrb(scenario, rtol=2e-2).mean_position_rmse()
 
     assert double(2.0) == pytest.approx(2 * plain, rel=1e-6)  # the user's own single precision
 

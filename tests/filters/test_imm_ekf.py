@@ -22,7 +22,7 @@ def textbook_tracks(scenario, z):
     [
         {"dim": 2},
         {"dim": 2, "discrete": True},  # Q singular
-        {"dim": 3, "links": 2, "outliers": True},
+        pytest.param({"dim": 3, "links": 2, "outliers": True}, marks=pytest.mark.slow),
     ],
     ids=str,
 )

@@ -30,6 +30,7 @@ def test_linear_cost_equals_the_quadratic_textbook(options):
     np.testing.assert_allclose(np.asarray(ours.covariance), [P for _, P in expected], rtol=1e-9, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_one_link_is_the_joint_filter():
     scenario = awkward(2, links=2, outliers=True)
     scenario = scenario.replace(links=scenario.links[1:])

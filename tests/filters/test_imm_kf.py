@@ -73,6 +73,7 @@ def test_it_is_causal(paper):
     assert np.abs(after[:, 61:] - before[:, 61:]).min() > 0
 
 
+@pytest.mark.slow
 def test_a_second_start_finds_the_position_across_the_base_line():
     """Started at the prior, on the wrong side of the anchors, the descent alone ends in a local minimum."""
     anchors = np.array([[0.0, 0.0], [100.0, 0.0], [50.0, 10.0]])

@@ -38,6 +38,7 @@ def log(model):
     return RangeLog(("a0", "a1", "a2"), model.anchors, tuple(tracks))
 
 
+@pytest.mark.slow
 def test_padding_changes_nothing(model, log):
     bound, filtered = along_tracks(model, log, bounds=[lb.bcrb], filters=[lb.ImmEkf()], rtol=0.05)
     assert (bound.id, filtered.id, bound.tracks) == ("bcrb", "imm-ekf", ("long", "short"))

@@ -53,6 +53,7 @@ def test_the_scenario(walk, tmp_path):
         assert [float(n.mean) for n in one.noises] == pytest.approx([float(n.mean) for n in other.noises])
 
 
+@pytest.mark.slow
 def test_locbounds_track_takes_it(walk, tmp_path):
     from locbounds.cli.app import app
 
