@@ -23,9 +23,9 @@ SIGMAS = 5.0
 # probability; neither comes from the engine behind the study. BCRB: the general engine, which separates nothing,
 #     b = lb.bcrb(lb.jump_markov(fritsche2013.scenario(stay)), rtol=3e-4, seed=2013)
 #     b.mean_position_rmse(first), b.mean_position_rmse_stderr(first)
-# whose window (12 steps, 24 at 0.95) cuts off less than 1e-5 of it. Enumer-BCRB: Kalman covariances in NumPy for
-# 100,000 drawn mode sequences of each stay probability, with gradients' products averaged over 50,000 drawn tracks,
-# that is `textbook_enumer(stay, 50_000, 100)` with other random numbers.
+# whose window (12 steps, 24 at 0.95) cuts off less than 1e-5 of it. Enumer-BCRB: Kalman covariances for 100,000
+# drawn mode sequences of each stay probability, with gradients' products averaged over 50,000 drawn tracks, that is
+# `textbook_enumer(stay, 50_000, 100)` with other random numbers.
 CONVERGED_M = {
     ("BCRB", 0.6): ((53.6809, 0.0072), (53.5106, 0.0072)),
     ("BCRB", 0.7): ((53.4120, 0.0083), (53.2390, 0.0084)),
