@@ -18,8 +18,8 @@ CLOCK_HZ = 44e6  # of the IEEE 802.11 round-trip-time counters in Prieto et al. 
 class Sensor(eqx.Module):
     """Samples ``z = mean(d) + noise + bias`` of a distance d, ``samples`` of them per epoch.
 
-    Parameters of the subclasses
-    ----------------------------
+    Attributes
+    ----------
     noise
         Noise of every sample, in the sensor's unit.
     bias
