@@ -103,7 +103,11 @@ def slow_target(stay):
     return lb.Scenario("slow", lb.Times.uniform(step_s=0.5, steps=24), lb.RandomWalk(0.02), start, links)
 
 
-@pytest.mark.parametrize("stay, sign", [(0.03, 1), (0.97, -1)], ids=["alternating", "sticky"])
+@pytest.mark.parametrize(
+    "stay, sign",
+    [pytest.param(0.03, 1, marks=pytest.mark.slow), (0.97, -1)],
+    ids=["alternating", "sticky"],
+)
 def test_a_plain_window_goes_wrong_by_percents_and_the_corrected_value_does_not(stay, sign):
     scenario = slow_target(stay)
     full = lb.bcrb(scenario, samples=4 * SAMPLES, window=24)

@@ -50,6 +50,7 @@ def test_the_schedule_is_table_1():
         chen2010.schedule(steps=15)
 
 
+@pytest.mark.slow
 def test_bounds_along_all_tracks_at_once_are_those_along_each(small):
     truth = chen2010.scenario(steps=STEPS).with_known_sight(chen2010.schedule(steps=STEPS))
     draws = lb.simulate(truth, runs=6, seed=0)
@@ -59,6 +60,7 @@ def test_bounds_along_all_tracks_at_once_are_those_along_each(small):
     np.testing.assert_allclose(along[:, 2], one.position_rmse.values, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_paired_difference_has_the_error_of_a_jackknife(small):
     a, b = small.results["RBPF"], small.results["IMM-KF"]
     difference, error = paired(a, b)
@@ -68,12 +70,14 @@ def test_the_paired_difference_has_the_error_of_a_jackknife(small):
     assert error == pytest.approx(np.sqrt(5 * np.var(without)), rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_cannot_hold_is_said_with_the_reason(small):
     said = {s.verdict: s for s in chen2010.statements(small)}
     assert "39.6" in said["cannot hold"].why
     assert "Per axis" in said["cannot hold"].why
 
 
+@pytest.mark.slow
 def test_the_command_writes_what_it_promises(tmp_path, monkeypatch, small):
     monkeypatch.setenv("LOCBOUNDS_CACHE", "off")
     monkeypatch.setattr("locbounds.papers.chen2010.study", lambda **_: small)

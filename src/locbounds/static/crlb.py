@@ -35,7 +35,7 @@ MANY = 16  # channels from which a common part of their noise is worth a look
 REASONS = {
     0: "",
     1: "the measurements do not determine the position here",
-    2: "no derivative here: at an anchor, where an angle is not defined, or the function's derivative is not finite",
+    2: "no derivative here: at an anchor, where an angle is not defined, or where a function has no finite one",
 }
 
 

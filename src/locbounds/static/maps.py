@@ -48,7 +48,7 @@ class AccuracyMap:
     >>> square = [[0, 0], [100, 0], [100, 100], [0, 100]]
     >>> found = lb.AccuracyMap(lb.toa(square, 2.0), lb.UniformBox([0, 0], [100, 100]), grid=5)
     >>> found.figures["crlb_rmse_m"].shape, found.notes
-    ((25,), ('4 of 25 points without a bound: no derivative here: at an anchor, or where an angle is not defined',))
+    ((25,), ('4 of 25 points without a bound: no derivative here: at an anchor, ...',))
     """
 
     def __init__(
